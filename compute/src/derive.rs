@@ -1,10 +1,12 @@
-//! Accumulated carbon: a product of fluxes in, a product of the carbon given off since a chosen start out.
+//! Products computed from others: a product of fluxes in, a product of the carbon given off since a chosen start out; any
+//! product in, a statistic of each of its cells out.
 
 mod at_cell;
 mod derivation;
 pub(crate) mod exact;
 mod prior;
 mod source;
+mod statistic;
 mod steps;
 
 use contract::digest::Digest;
@@ -19,6 +21,7 @@ use crate::{ComputeError, Engine, catalogue};
 pub(crate) use at_cell::counts_at_cell;
 use derivation::Derivation;
 use source::{SourceStep, steps_since};
+pub use statistic::derive_statistic;
 
 /// How often the commit is tried again when another writer takes the number.
 const COMMIT_ATTEMPTS: u32 = 5;

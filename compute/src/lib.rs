@@ -5,6 +5,7 @@
 //! same bits however many parts it was computed in.
 
 pub mod air_sea;
+pub mod analysis;
 pub mod budget;
 pub mod catalogue;
 pub mod check;

@@ -87,7 +87,12 @@ impl TransferFunction {
             Quantity::Elevation => (Palette::Balance, -6000.0, 6000.0),
             Quantity::Open(open) => {
                 let [low, high] = open.words().range.map_or([0.0, 1.0], with_width);
-                (Palette::Thermal, low, high)
+                if open.is_difference() {
+                    let most = low.abs().max(high.abs());
+                    (Palette::Delta, -most, most)
+                } else {
+                    (Palette::Thermal, low, high)
+                }
             }
         };
         Self {

@@ -4,6 +4,7 @@
 //! from it. Left out on purpose: input and output, async, GPU, SQL.
 #![warn(missing_docs, clippy::missing_errors_doc)]
 
+pub mod analysis;
 pub mod annotation;
 pub mod base_map;
 pub mod budget;

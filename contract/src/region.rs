@@ -85,6 +85,27 @@ impl Region {
             north,
         })
     }
+
+    /// West, south, east, north of a box, degrees; none of the whole globe.
+    ///
+    /// # Errors
+    /// Polygons.
+    pub fn as_box(&self) -> Result<Option<[f64; 4]>, ContractError> {
+        match self {
+            Self::Global => Ok(None),
+            Self::Box {
+                west,
+                south,
+                east,
+                north,
+            } => Ok(Some([*west, *south, *east, *north])),
+            Self::Polygons(_) => Err(ContractError::invalid(
+                "region",
+                "a polygon",
+                "bands of latitude or longitude need a box, west,south,east,north in degrees",
+            )),
+        }
+    }
 }
 
 impl std::str::FromStr for Region {

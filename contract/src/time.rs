@@ -59,6 +59,12 @@ impl TimeMs {
         (t.year(), t.month())
     }
 
+    /// Month (1 to 12) and day of the month (1 to 31) of the instant.
+    pub fn month_day(self) -> (u32, u32) {
+        let t = self.utc();
+        (t.month(), t.day())
+    }
+
     fn utc(self) -> DateTime<Utc> {
         DateTime::from_timestamp_millis(self.0).expect("range is checked at construction")
     }

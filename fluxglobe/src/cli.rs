@@ -1,7 +1,9 @@
 //! The command line: words in, one plain `Command` out. Every value is parsed here, once, into its final type.
 
+mod analysis;
 mod annotations;
 mod derive;
+mod derived;
 mod export;
 mod fill;
 mod ground;
@@ -26,8 +28,12 @@ use contract::product::ProductId;
 use contract::region::Cells;
 use contract::time::TimeMs;
 
+pub(crate) use analysis::{
+    Place, PlotFile, PlotForm, StatsCorrelate, StatsDifference, StatsHovmoller,
+};
 pub(crate) use annotations::Annotated;
 pub(crate) use derive::{Derive, DeriveCo2Flux, DeriveWhat, Expression, Regrid};
+pub(crate) use derived::DeriveStatistic;
 pub(crate) use export::{Export, ExportFormat, ExportedProduct};
 pub(crate) use fill::{BenchFill, FillError, ProductsOf};
 pub(crate) use ground::{Ground, GroundOptions};

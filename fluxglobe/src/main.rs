@@ -10,6 +10,7 @@ mod desktop;
 mod file_handles;
 mod heights;
 mod picture;
+mod plot;
 mod ports;
 mod progress;
 mod protocol;

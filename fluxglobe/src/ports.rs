@@ -8,6 +8,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use async_trait::async_trait;
 use bytes::Bytes;
 use compute::{ComputeError, Engine, ErrorClass};
+use contract::analysis::SeriesQuery;
 use contract::budget::{BudgetAnswer, BudgetQuery};
 use contract::check::Check;
 use contract::encoding::Encoding;
@@ -20,7 +21,9 @@ use contract::statistics::{StatisticsAnswer, StatisticsQuery};
 use render_worker::Desk;
 use render_worker::desk::{DeskError, Order, Storing};
 use render_worker::fleet::{Fleet, FleetError};
-use tile_server::backend::{Analyse, BackendError, Class, Draw, Keep, Turn};
+use tile_server::backend::{
+    Analyse, BackendError, Class, Draw, Keep, MadeOfSeries, SeriesQuestion, Turn, Version,
+};
 
 pub(crate) use observer::Observer;
 
@@ -65,6 +68,18 @@ impl Analyst {
             check,
         }
     }
+
+    /// Who reads a series.
+    fn reader(&self, series: &SeriesQuery) -> &Engine {
+        match series {
+            SeriesQuery::Cell { .. } => &self.local,
+            SeriesQuery::Region(_) => &self.regions,
+        }
+    }
+}
+
+fn parts(version: &Version) -> compute::analysis::Version<'_> {
+    (&version.manifest, &version.id)
 }
 
 #[async_trait]
@@ -141,6 +156,39 @@ impl Analyse for Analyst {
         };
         let answer = compute::reduce::statistics_of(engine, query, manifest);
         answer.await.map_err(compute_failed)
+    }
+
+    async fn made_of_series(
+        &self,
+        question: &SeriesQuestion,
+    ) -> Result<MadeOfSeries, BackendError> {
+        use compute::analysis::{analyse, correlation, difference, hovmoller};
+        let made = match question {
+            SeriesQuestion::Analysis {
+                of,
+                series,
+                options,
+            } => analyse(self.reader(series), parts(of), series, options)
+                .await
+                .map(MadeOfSeries::Analysis),
+            SeriesQuestion::Correlation { of, with, query } => {
+                correlation(self.reader(&query.series), parts(of), parts(with), query)
+                    .await
+                    .map(MadeOfSeries::Correlation)
+            }
+            SeriesQuestion::Difference { of, minus } => {
+                let (a, b) = ((parts(&of.0), &of.1), (parts(&minus.0), &minus.1));
+                difference(self.reader(&of.1), a, b)
+                    .await
+                    .map(MadeOfSeries::Difference)
+            }
+            SeriesQuestion::Hovmoller { of, query } => {
+                hovmoller(self.local.store(), parts(of), query)
+                    .await
+                    .map(MadeOfSeries::Hovmoller)
+            }
+        };
+        made.map_err(compute_failed)
     }
 
     async fn check(&self) -> Result<Option<Check>, BackendError> {

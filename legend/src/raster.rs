@@ -62,7 +62,10 @@ pub fn text_boxes(svg: &str) -> Result<Vec<[f64; 4]>, LegendError> {
 }
 
 /// The pixels of a drawing as PNG.
-pub(crate) fn png(svg: &str) -> Result<Vec<u8>, LegendError> {
+///
+/// # Errors
+/// A text that is no SVG.
+pub fn png(svg: &str) -> Result<Vec<u8>, LegendError> {
     let encoded = pixmap(svg)?.encode_png();
     encoded.map_err(|error| LegendError::Raster(error.to_string()))
 }

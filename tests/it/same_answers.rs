@@ -112,6 +112,39 @@ fn a_question_on_the_command_line_and_over_http_has_one_answer() {
         assert!(!rows.as_array().unwrap().is_empty(), "{printed}");
         assert_eq!(served.json().unwrap(), printed, "{path}");
     }
+    made_of_series(data, &server);
+}
+
+/// The same of climatologies, correlations, differences and bands.
+fn made_of_series(data: &Path, server: &Server) {
+    for (words, path) in [
+        (
+            "stats polygon --product flux --region 14n-50n --climatology --anomaly --trend --extremes",
+            "flux/analysis?region=14n-50n&parts=climatology,anomaly,trend,extremes",
+        ),
+        (
+            "stats point --product flux --lon 181.3 --lat -4.1 --climatology --base 2000/2001 --bins season",
+            "flux/analysis?lon=181.3&lat=-4.1&parts=climatology&base=2000/2001&bins=season",
+        ),
+        (
+            "stats correlate --product flux --product flux-accumulated --region 14n-50n --max-lag 1",
+            "flux/correlation?with=flux-accumulated&region=14n-50n&max_lag=1",
+        ),
+        (
+            "stats difference --product flux --region global --period 2000/2000 --minus-period 1999/2001",
+            "flux/difference?region=global&period=2000/2000&minus_period=1999/2001",
+        ),
+        (
+            "stats hovmoller --product flux --along lat --band 20 --region -30,-60,30,60",
+            "flux/hovmoller?along=lat&band=20&region=-30,-60,30,60",
+        ),
+    ] {
+        let words: Vec<&str> = words.split_whitespace().chain(["--json"]).collect();
+        let printed = program::json(data, &words).unwrap();
+        let served = server.get(&format!("/api/products/{path}")).unwrap();
+        assert_eq!(served.status, 200, "{path}: {}", served.text());
+        assert_eq!(served.json().unwrap(), printed, "{path}");
+    }
 }
 
 #[test]

@@ -1,6 +1,8 @@
 //! Series and budgets from the analyst, within limits; those of regions are remembered, since their question names a
 //! version.
 
+mod of_series;
+
 use std::future::Future;
 use std::sync::Arc;
 
@@ -13,7 +15,7 @@ use contract::statistics::{StatisticsAnswer, StatisticsQuery};
 use quick_cache::Weighter;
 use quick_cache::sync::Cache;
 
-use crate::backend::{Analyse, BackendError};
+use crate::backend::{Analyse, BackendError, MadeOfSeries};
 use crate::catalogue::Layer;
 use crate::error::ServerError;
 use crate::gate::Gate;
@@ -24,6 +26,8 @@ use crate::single_flight::SingleFlight;
 const BUDGETS: usize = 1000;
 /// Series over regions remembered; one of 16 years of days takes 320 KiB.
 const AREAS: usize = 100;
+/// What is made of series and remembered; a Hovmöller diagram takes 8 MiB at most.
+const MADE_OF_SERIES: usize = 40;
 
 /// Statistics remembered, a guess that sizes tables.
 const STATISTICS: usize = 1000;
@@ -45,6 +49,7 @@ pub struct Analyses {
     budgets: Answers<BudgetAnswer>,
     areas: Answers<RegionSeries>,
     statistics: Answers<StatisticsAnswer>,
+    made_of_series: Answers<MadeOfSeries>,
 }
 
 /// Answers of one kind, by the digest of what was asked: those remembered and those under way.
@@ -112,6 +117,7 @@ impl Analyses {
             budgets: Answers::new(BUDGETS, BUDGETS as u64, |_one| 1),
             areas: Answers::new(AREAS, AREAS as u64, |_one| 1),
             statistics: Answers::new(STATISTICS, STATISTICS_NUMBERS, numbers),
+            made_of_series: Answers::new(MADE_OF_SERIES, MADE_OF_SERIES as u64, |_one| 1),
         }
     }
 

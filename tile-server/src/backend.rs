@@ -9,6 +9,10 @@ use std::time::Duration;
 
 use async_trait::async_trait;
 use bytes::Bytes;
+use contract::analysis::{
+    AnalysisOptions, Correlation, CorrelationQuery, Difference, Hovmoller, HovmollerQuery,
+    SeriesAnalysis, SeriesQuery,
+};
 use contract::budget::{BudgetAnswer, BudgetQuery};
 use contract::check::Check;
 use contract::encoding::Encoding;
@@ -18,6 +22,7 @@ use contract::manifest::{Manifest, ManifestId};
 use contract::observation::{Filter, Page, Platform, TrackPoint, TrackQuery};
 use contract::series::{PointSeries, RegionSeries, RegionSeriesQuery};
 use contract::statistics::{StatisticsAnswer, StatisticsQuery};
+use serde::Serialize;
 use tokio::sync::OwnedSemaphorePermit;
 
 /// Leave to draw one picture; the next one waiting gets it when this is dropped.
@@ -67,6 +72,66 @@ pub trait Draw: Send + Sync + 'static {
     async fn ready(&self) -> Result<(), BackendError>;
 }
 
+/// A version of a product.
+#[derive(Clone)]
+pub struct Version {
+    /// What it consists of.
+    pub manifest: Arc<Manifest>,
+    /// Its name, which is costly to compute.
+    pub id: ManifestId,
+}
+
+/// What is asked of series.
+#[derive(Clone)]
+pub enum SeriesQuestion {
+    /// Climatology, anomaly, trend, season, extremes of one.
+    Analysis {
+        /// Of which version.
+        of: Version,
+        /// Where and when.
+        series: SeriesQuery,
+        /// What.
+        options: AnalysisOptions,
+    },
+    /// How two go together.
+    Correlation {
+        /// The first.
+        of: Version,
+        /// The second.
+        with: Version,
+        /// Where, when and how.
+        query: CorrelationQuery,
+    },
+    /// The mean of one less that of the other.
+    Difference {
+        /// The one.
+        of: (Version, SeriesQuery),
+        /// The other.
+        minus: (Version, SeriesQuery),
+    },
+    /// Latitude or longitude against time.
+    Hovmoller {
+        /// Of which version.
+        of: Version,
+        /// Where, when and how.
+        query: HovmollerQuery,
+    },
+}
+
+/// What was made of series.
+#[derive(Debug, Clone, Serialize)]
+#[serde(untagged)]
+pub enum MadeOfSeries {
+    /// Of one.
+    Analysis(SeriesAnalysis),
+    /// How two go together.
+    Correlation(Correlation),
+    /// A difference of means.
+    Difference(Difference),
+    /// Latitude or longitude against time.
+    Hovmoller(Hovmoller),
+}
+
 /// Computes series and budgets.
 #[async_trait]
 pub trait Analyse: Send + Sync + 'static {
@@ -99,6 +164,9 @@ pub trait Analyse: Send + Sync + 'static {
         manifest: &Manifest,
         query: &StatisticsQuery,
     ) -> Result<StatisticsAnswer, BackendError>;
+    /// What is made of series of versions of products.
+    async fn made_of_series(&self, question: &SeriesQuestion)
+    -> Result<MadeOfSeries, BackendError>;
 
     /// Our budgets beside published ones; none where this deployment has nothing to compare with.
     async fn check(&self) -> Result<Option<Check>, BackendError>;

@@ -14,8 +14,9 @@ use utoipa::{Modify, OpenApi};
 
 use crate::error::Refusal;
 use crate::routes::{
-    area, budget, check, events, globe, health, legend, line, metrics, observations, openapi,
-    palettes, platforms, point, products, regions, stream, tilejson, tiles, zarr,
+    analysis, area, budget, check, correlation, difference, events, globe, health, hovmoller,
+    legend, line, metrics, observations, openapi, palettes, platforms, point, products, regions,
+    stream, tilejson, tiles, zarr,
 };
 
 /// What an operation that takes long or needs others answers when it cannot.
@@ -46,6 +47,10 @@ const RETRY_AFTER: &str = "Seconds after which the same request may succeed";
         point::get,
         line::get,
         area::get,
+        analysis::get,
+        correlation::get,
+        difference::get,
+        hovmoller::get,
         budget::get,
         check::get,
         zarr::get,
@@ -57,6 +62,10 @@ const RETRY_AFTER: &str = "Seconds after which the same request may succeed";
     ),
     components(schemas(
         Refusal,
+        contract::analysis::Along,
+        contract::analysis::BasePeriod,
+        contract::analysis::CalendarBins,
+        contract::analysis::MeanStep,
         contract::budget::BudgetStep,
         contract::earth::Earth,
         contract::geometry::Sampling,

@@ -19,8 +19,9 @@ use crate::error::ServerError;
 use crate::middleware::{body, panics::CountPanics, security, track};
 use crate::routes::picture::{COVERED, SHOWN_TIME};
 use crate::routes::{
-    area, budget, check, events, globe, health, legend, line, metrics, observations, openapi,
-    palettes, platforms, point, products, regions, stream, tilejson, tiles, viewer, zarr,
+    analysis, area, budget, check, correlation, difference, events, globe, health, hovmoller,
+    legend, line, metrics, observations, openapi, palettes, platforms, point, products, regions,
+    stream, tilejson, tiles, viewer, zarr,
 };
 use crate::state::AppState;
 
@@ -64,6 +65,10 @@ pub fn router(state: AppState) -> Router {
         .route("/api/products/{product}/point", get(point::get))
         .route("/api/products/{product}/line", get(line::get))
         .route("/api/products/{product}/area", get(area::get))
+        .route("/api/products/{product}/analysis", get(analysis::get))
+        .route("/api/products/{product}/correlation", get(correlation::get))
+        .route("/api/products/{product}/difference", get(difference::get))
+        .route("/api/products/{product}/hovmoller", get(hovmoller::get))
         .route("/api/products/{product}/budget", get(budget::get))
         .route("/api/products/{product}/{legend_file}", get(legend::get))
         .route("/api/regions", get(regions::list))

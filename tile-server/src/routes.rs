@@ -1,11 +1,15 @@
 //! One file for each noun that can be asked for; the addresses are in `router`.
 
+pub(crate) mod analysis;
 pub(crate) mod area;
 pub(crate) mod budget;
 pub(crate) mod check;
+pub(crate) mod correlation;
+pub(crate) mod difference;
 pub(crate) mod events;
 pub(crate) mod globe;
 pub(crate) mod health;
+pub(crate) mod hovmoller;
 pub(crate) mod legend;
 pub(crate) mod line;
 pub(crate) mod metrics;

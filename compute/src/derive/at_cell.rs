@@ -1,6 +1,7 @@
 //! How complete the sums of one cell are, told from the series of the flux that they were accumulated from.
 
 use contract::manifest::Manifest;
+use contract::quantity::Quantity;
 use contract::series::CellCounts;
 use storage::manifests;
 
@@ -21,6 +22,10 @@ pub(crate) async fn counts_at_cell(
     let (Some(id), Some(extent)) = (&manifest.derived_from, manifest.extent()) else {
         return Ok(None);
     };
+    // Statistics are derived too, and are no sums.
+    if manifest.quantity != Quantity::AccumulatedCarbon {
+        return Ok(None);
+    }
     let source = match manifests::load(engine.store(), id).await {
         Ok(source) => source,
         Err(e) if e.is_not_found() => return Ok(None),

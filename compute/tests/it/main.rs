@@ -3,6 +3,8 @@
 #[cfg(test)]
 mod accumulated;
 #[cfg(test)]
+mod analysed;
+#[cfg(test)]
 mod budgets;
 #[cfg(test)]
 mod cleaned;
@@ -22,6 +24,8 @@ mod fluxengine;
 mod frozen;
 #[cfg(test)]
 mod incremental;
+#[cfg(test)]
+mod maps;
 #[cfg(test)]
 mod node;
 #[cfg(test)]

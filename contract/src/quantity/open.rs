@@ -96,6 +96,12 @@ impl OpenQuantity {
         &self.0.shown_unit
     }
 
+    /// Are its values differences, on either side of none? Anomalies and trends are.
+    pub fn is_difference(self) -> bool {
+        let name = &self.words().name;
+        name.ends_with("_anomaly") || name.ends_with("_trend")
+    }
+
     /// Is it the same but for title and range?
     pub fn is_same_kind(self, other: Self) -> bool {
         let (own, other) = (self.words(), other.words());

@@ -59,6 +59,8 @@ pub(crate) enum DeriveWhat {
     Co2Flux(Box<DeriveCo2Flux>),
     /// A product brought to the grid of another.
     Regrid(Regrid),
+    /// A statistic of each cell over time, as a product that is drawn and served like any other.
+    Statistic(super::DeriveStatistic),
     /// List the functions that expressions may call, with units and papers.
     Functions,
 }

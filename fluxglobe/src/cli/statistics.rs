@@ -8,6 +8,8 @@ use contract::region::Cells;
 use contract::statistics::{MinCoverage, Statistics, StatisticsStep};
 use contract::time::TimeMs;
 
+use super::analysis::{Analysis, PlotFile, StatsCorrelate, StatsDifference, StatsHovmoller};
+
 /// `fluxglobe stats`.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Stats {
@@ -17,6 +19,12 @@ pub(crate) enum Stats {
     Line(StatsLine),
     /// The mean over a region at every step, each cell by its area, with the area that holds data; or other statistics of it.
     Polygon(StatsPolygon),
+    /// How the series of two products go together, now and some steps later.
+    Correlate(StatsCorrelate),
+    /// The mean over time of two periods, versions or products, one less the other.
+    Difference(StatsDifference),
+    /// Latitude or longitude against time (Hovmöller): means of bands, step by step.
+    Hovmoller(StatsHovmoller),
 }
 
 /// What is asked besides a plain series.
@@ -67,6 +75,8 @@ pub(crate) struct StatsPoint {
     pub(crate) sampling: Option<Sampling>,
     #[command(flatten)]
     pub(crate) statistics: StatisticsOptions,
+    #[command(flatten)]
+    pub(crate) analysis: Analysis,
     /// JSON instead of a table.
     #[arg(long)]
     pub(crate) json: bool,
@@ -100,6 +110,9 @@ pub(crate) struct StatsLine {
     pub(crate) earth: Earth,
     #[command(flatten)]
     pub(crate) statistics: StatisticsOptions,
+    /// Draw it too: the mean with its standard deviation where both are asked for, and the other statistics of its unit.
+    #[arg(long, value_name = "FILE.svg|FILE.png")]
+    pub(crate) plot: Option<PlotFile>,
     /// JSON instead of a table.
     #[arg(long)]
     pub(crate) json: bool,
@@ -133,6 +146,8 @@ pub(crate) struct StatsPolygon {
     pub(crate) ocean: Option<ProductId>,
     #[command(flatten)]
     pub(crate) statistics: StatisticsOptions,
+    #[command(flatten)]
+    pub(crate) analysis: Analysis,
     /// JSON instead of a table.
     #[arg(long)]
     pub(crate) json: bool,

@@ -16,7 +16,9 @@ use kafka_log::KafkaSettings;
 use storage::Store;
 use storage::log::EventLog;
 
-use crate::cli::{Derive, DeriveCo2Flux, DeriveWhat, Expression, Regrid, Settings};
+use crate::cli::{
+    Derive, DeriveCo2Flux, DeriveStatistic, DeriveWhat, Expression, Regrid, Settings,
+};
 use crate::{deployment, progress};
 
 pub(crate) async fn run(settings: &Settings, options: Derive) -> Result<()> {
@@ -25,6 +27,7 @@ pub(crate) async fn run(settings: &Settings, options: Derive) -> Result<()> {
         Some(DeriveWhat::Co2Flux(options)) => co2_flux(settings, *options).await,
         Some(DeriveWhat::Regrid(options)) => regrid(settings, options).await,
         Some(DeriveWhat::Functions) => functions(),
+        Some(DeriveWhat::Statistic(options)) => statistic(settings, &options).await,
         Some(DeriveWhat::Accumulated {
             product,
             start,
@@ -175,6 +178,27 @@ fn functions() -> Result<()> {
         }
     }
     progress::result(&text)
+}
+
+/// Computes a statistic of each cell with a progress bar; at once if it is there already.
+async fn statistic(settings: &Settings, options: &DeriveStatistic) -> Result<()> {
+    let store = deployment::store(settings)?;
+    deployment::manifest(&store, &options.product, &settings.data).await?;
+    let log = listening(settings, &options.kafka).await?;
+    let bar = progress::bar("statistic of each cell", 0);
+    // A block of cells is read by one query, which a scheduler would only delay.
+    let engine = deployment::region_engine(settings, store)?;
+    let on_cells = |progress: DeriveProgress| {
+        bar.set_length(progress.all_steps as u64);
+        bar.set_position(progress.done_steps as u64);
+    };
+    let asked = options.asked();
+    let derived = compute::derive::derive_statistic(&engine, &options.product, &asked, &on_cells);
+    let manifest = derived.await?;
+    tell(log.as_deref(), &manifest).await?;
+    let outcome = format!("{} fields of {}", manifest.steps.len(), manifest.product);
+    progress::done(&bar, &outcome);
+    progress::result(&manifest.id().to_string())
 }
 
 /// Tells of a derived version, once.

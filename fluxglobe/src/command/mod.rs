@@ -1,6 +1,7 @@
 //! One file a command; this one only sends each command to its file.
 
 mod adapters;
+mod analysis;
 mod budget;
 pub(crate) mod derive;
 mod export;
@@ -42,6 +43,15 @@ pub(crate) async fn run(settings: &Settings, command: Command) -> Result<ExitCod
         Command::Stats(Stats::Point(options)) => stats::point(settings, &options).await?,
         Command::Stats(Stats::Line(options)) => statistics::line(settings, &options).await?,
         Command::Stats(Stats::Polygon(options)) => stats::polygon(settings, &options).await?,
+        Command::Stats(Stats::Correlate(options)) => {
+            analysis::correlate(settings, &options).await?;
+        }
+        Command::Stats(Stats::Difference(options)) => {
+            analysis::difference(settings, &options).await?;
+        }
+        Command::Stats(Stats::Hovmoller(options)) => {
+            analysis::hovmoller(settings, &options).await?;
+        }
         Command::Budget(options) => budget::run(settings, &options).await?,
         Command::Derive(options) => {
             derive::run(settings, *options).await?;

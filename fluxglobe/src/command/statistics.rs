@@ -12,8 +12,8 @@ use contract::grid::LonLatDeg;
 use contract::statistics::{StatisticsAnswer, StatisticsQuery, StatisticsRow};
 
 use super::budget::{ocean, stored_region};
-use crate::cli::{Settings, StatisticsOptions, StatsLine, StatsPoint, StatsPolygon};
-use crate::{deployment, progress};
+use crate::cli::{PlotFile, Settings, StatisticsOptions, StatsLine, StatsPoint, StatsPolygon};
+use crate::{deployment, plot, progress};
 
 /// How an answer is printed.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -48,6 +48,7 @@ pub(crate) async fn point(settings: &Settings, options: &StatsPoint) -> Result<(
         settings,
         &query,
         Form::of(&options.statistics, options.json),
+        options.analysis.plot.as_ref(),
     )
     .await
 }
@@ -75,6 +76,7 @@ pub(crate) async fn line(settings: &Settings, options: &StatsLine) -> Result<()>
         settings,
         &query,
         Form::of(&options.statistics, options.json),
+        options.plot.as_ref(),
     )
     .await
 }
@@ -98,6 +100,7 @@ pub(crate) async fn polygon(settings: &Settings, options: &StatsPolygon) -> Resu
         settings,
         &query,
         Form::of(&options.statistics, options.json),
+        options.analysis.plot.as_ref(),
     )
     .await
 }
@@ -111,13 +114,21 @@ fn query(usual: StatisticsQuery, options: &StatisticsOptions) -> StatisticsQuery
     }
 }
 
-async fn run(settings: &Settings, query: &StatisticsQuery, form: Form) -> Result<()> {
+async fn run(
+    settings: &Settings,
+    query: &StatisticsQuery,
+    form: Form,
+    plot: Option<&PlotFile>,
+) -> Result<()> {
     let store = deployment::store(settings)?;
     deployment::manifest(&store, &query.product, &settings.data).await?;
     let engine = deployment::region_engine(settings, store)?;
     let bar = progress::bar("statistics", 1);
     let answer = statistics(&engine, query).await?;
     bar.finish_and_clear();
+    if let Some(file) = plot {
+        plot::write(file, &plot::of_statistics(&answer)?)?;
+    }
     match form {
         Form::Json => return progress::result(&serde_json::to_string_pretty(&answer)?),
         Form::Csv => progress::result(csv(&answer).trim_end())?,

@@ -1,17 +1,19 @@
 //! `fluxglobe stats`: a product and a place or a region in; the series of its cell, or of the region's mean, as a table or
 //! JSON out.
 
-use anyhow::Result;
+use anyhow::{Result, bail};
 use comfy_table::presets::NOTHING;
 use comfy_table::{CellAlignment, Table};
 use compute::Engine;
 use compute::stats::region_series;
+use contract::analysis::SeriesQuery;
 use contract::grid::LonLatDeg;
 use contract::series::{PointSeries, RegionSeries, RegionSeriesQuery};
 
 use crate::cli::{Settings, StatsPoint, StatsPolygon};
-use crate::{deployment, progress};
+use crate::{deployment, plot, progress};
 
+use super::analysis::{self, Output};
 use super::budget::{ocean, stored_region};
 use super::statistics;
 
@@ -21,14 +23,32 @@ const BAR_CHARS: f64 = 30.0;
 const M2_PER_MILLION_KM2: f64 = 1e12;
 
 pub(crate) async fn point(settings: &Settings, options: &StatsPoint) -> Result<()> {
+    let place = LonLatDeg::new(options.lon, options.lat)?;
+    let output = Output {
+        json: options.json,
+        plot: options.analysis.plot.as_ref(),
+    };
+    if let Some(asked) = options.analysis.asked()? {
+        alone(options.sampling.is_some() || options.statistics.are_asked())?;
+        let query = SeriesQuery::Cell {
+            product: options.product.clone(),
+            place,
+            from: options.from,
+            to: options.to,
+        };
+        let store = deployment::store(settings)?;
+        return analysis::of_series(settings, store, &query, &asked, output).await;
+    }
     if options.are_statistics_asked() {
         return statistics::point(settings, options).await;
     }
-    let place = LonLatDeg::new(options.lon, options.lat)?;
     let store = deployment::store(settings)?;
     deployment::manifest(&store, &options.product, &settings.data).await?;
     let answer =
         compute::point::point_series(&Engine::local(store), &options.product, place).await?;
+    if let Some(file) = output.plot {
+        plot::write(file, &plot::of_point(&answer)?)?;
+    }
     if options.json {
         return progress::result(&serde_json::to_string_pretty(&answer)?);
     }
@@ -46,7 +66,10 @@ pub(crate) async fn point(settings: &Settings, options: &StatsPoint) -> Result<(
 }
 
 pub(crate) async fn polygon(settings: &Settings, options: &StatsPolygon) -> Result<()> {
-    if options.are_statistics_asked() {
+    let analysed = options.analysis.asked()?;
+    if analysed.is_some() {
+        alone(options.are_statistics_asked())?;
+    } else if options.are_statistics_asked() {
         return statistics::polygon(settings, options).await;
     }
     let store = deployment::store(settings)?;
@@ -60,11 +83,22 @@ pub(crate) async fn polygon(settings: &Settings, options: &StatsPolygon) -> Resu
             stored_region(settings, &store, &options.region).await?,
         )
     };
+    let output = Output {
+        json: options.json,
+        plot: options.analysis.plot.as_ref(),
+    };
+    if let Some(asked) = analysed {
+        let query = SeriesQuery::Region(query);
+        return analysis::of_series(settings, store, &query, &asked, output).await;
+    }
     deployment::manifest(&store, &options.product, &settings.data).await?;
     let bar = progress::bar("mean over the region", 1);
     let engine = deployment::region_engine(settings, store)?;
     let answer = region_series(&engine, &query).await?;
     bar.finish_and_clear();
+    if let Some(file) = output.plot {
+        plot::write(file, &plot::of_region(&answer)?)?;
+    }
     if options.json {
         return progress::result(&serde_json::to_string_pretty(&answer)?);
     }
@@ -83,6 +117,17 @@ pub(crate) async fn polygon(settings: &Settings, options: &StatsPolygon) -> Resu
         progress::say(&format!("note: {note}"));
     }
     progress::say(&answer.source);
+    Ok(())
+}
+
+/// What is made of a series is made of its means at all steps.
+fn alone(are_statistics_asked: bool) -> Result<()> {
+    if are_statistics_asked {
+        bail!(
+            "--climatology, --anomaly, --trend, --season and --extremes are made of the means of all steps: leave \
+             --statistic, --step, --min-coverage, --sampling, --cells and --csv out"
+        );
+    }
     Ok(())
 }
 

@@ -23,9 +23,12 @@ use contract::statistics::{
     Statistic, StatisticNote, StatisticsAnswer, StatisticsQuery, StatisticsRow,
 };
 use contract::topic::{Origin, Topic};
+use serde_json::{Value, json};
 use storage::log::{EmbeddedLog, EventLog, Follower, Message, Reader, Start};
 use storage::{StorageError, Store};
-use tile_server::backend::{Analyse, BackendError, Class, Draw, Keep, Observe, Turn};
+use tile_server::backend::{
+    Analyse, BackendError, Class, Draw, Keep, MadeOfSeries, Observe, SeriesQuestion, Turn, Version,
+};
 use tokio::sync::Semaphore;
 
 /// How a double answers.
@@ -210,6 +213,7 @@ pub(crate) struct Analyst {
     pub(crate) versions: Mutex<Vec<u64>>,
     pub(crate) areas: Mutex<Vec<RegionSeriesQuery>>,
     pub(crate) statistics: Mutex<Vec<StatisticsQuery>>,
+    pub(crate) made: Mutex<Vec<SeriesQuestion>>,
     pub(crate) check: Mutex<Option<Check>>,
     pub(crate) mood: Mutex<Mood>,
 }
@@ -400,10 +404,103 @@ impl Analyse for Analyst {
         })
     }
 
+    /// One row of each kind.
+    async fn made_of_series(
+        &self,
+        question: &SeriesQuestion,
+    ) -> Result<MadeOfSeries, BackendError> {
+        self.mood().apply()?;
+        self.made.lock().unwrap().push(question.clone());
+        Ok(match question {
+            SeriesQuestion::Analysis { of: version, .. } => {
+                MadeOfSeries::Analysis(serde_json::from_value(analysis(version)).unwrap())
+            }
+            SeriesQuestion::Correlation { of: a, with: b, .. } => {
+                MadeOfSeries::Correlation(serde_json::from_value(correlation(a, b)).unwrap())
+            }
+            SeriesQuestion::Difference { of: a, minus: b } => {
+                MadeOfSeries::Difference(serde_json::from_value(difference(&a.0, &b.0)).unwrap())
+            }
+            SeriesQuestion::Hovmoller { of: version, .. } => {
+                MadeOfSeries::Hovmoller(serde_json::from_value(hovmoller(version)).unwrap())
+            }
+        })
+    }
+
     async fn check(&self) -> Result<Option<Check>, BackendError> {
         self.mood().apply()?;
         Ok(self.check.lock().unwrap().clone())
     }
+}
+
+fn cited(version: &Version, more: Value) -> Value {
+    let manifest = &version.manifest;
+    let mut cited = json!({"product": manifest.product, "manifest": version.id, "title": manifest.title,
+        "source": manifest.source, "synthetic": manifest.synthetic, "quantity": manifest.quantity,
+        "unit": manifest.quantity.display().unit});
+    let Value::Object(more) = more else {
+        unreachable!("an object is given")
+    };
+    cited.as_object_mut().unwrap().extend(more);
+    cited
+}
+
+fn analysis(of: &Version) -> Value {
+    let step =
+        json!({"start": "2000-01-01T00:00:00Z", "end": "2000-02-01T00:00:00Z", "value": 1.5});
+    cited(
+        of,
+        json!({"region": "global", "start": "2000-01-01T00:00:00Z", "end": "2000-04-01T00:00:00Z",
+        "step_count": 3, "value_count": 2, "notes": ["a note"],
+        "refused": [{"part": "season", "reason": "too short"}],
+        "climatology": {"bins": "month", "base": "2000/2000",
+            "rows": [{"bin": "January", "mean": 1.5, "spread": null, "count": 1, "years": 1}]},
+        "anomaly": {"bins": "month", "base": "2000/2000", "rows": [{"start": "2000-01-01T00:00:00Z",
+            "end": "2000-02-01T00:00:00Z", "mid": "2000-01-16T12:00:00Z", "value": 1.5, "normal": 1.5,
+            "anomaly": 0.0, "standardised": null}]},
+        "trend": {"slope_unit": "°C per decade", "step": "month", "deseasonalised": true, "count": 60,
+            "years": 5.0, "mid": "2000-02-01T00:00:00Z", "mean": 1.0,
+            "least_squares": {"slope_per_decade": 0.1, "standard_error_per_decade": null,
+                "lower_per_decade": null, "upper_per_decade": null, "p_value": null,
+                "lag1_autocorrelation": 0.99, "effective_count": 1.0},
+            "theil_sen": {"slope_per_decade": 0.1, "lower_per_decade": 0.0, "upper_per_decade": 0.2, "at_mid": 1.0},
+            "mann_kendall": {"score": 3, "tau": 0.1, "variance_correction": 1.0, "z": 0.5, "p_value": 0.6},
+            "values": [step]},
+        "season": {"mean": 1.0, "has_trend": false, "annual": {"amplitude": 1.0, "highest_after_days": 30.0},
+            "semi_annual": {"amplitude": 0.0, "highest_after_days": 0.0}, "explained_percent": 90.0,
+            "residual_spread": 0.1, "count": 12},
+        "extremes": {"highest": [step], "lowest": [step], "percentiles": [{"percent": 50.0, "value": 1.5}]}}),
+    )
+}
+
+fn correlation(first: &Version, second: &Version) -> Value {
+    let row = json!({"lag_steps": 0, "count": 3, "correlation": null, "effective_count": null, "p_value": null});
+    json!({"first": cited(first, json!({})), "second": cited(second, json!({})), "region": "global",
+        "step": "month", "deseasonalised": false, "start": "2000-01-01T00:00:00Z",
+        "end": "2000-04-01T00:00:00Z", "notes": [], "rows": [row], "strongest_lag_steps": null})
+}
+
+fn difference(of: &Version, minus: &Version) -> Value {
+    let side = |version: &Version| {
+        let (start, end) = ("2000-01-01T00:00:00Z", "2000-04-01T00:00:00Z");
+        cited(
+            version,
+            json!({"start": start, "end": end, "count": 3, "mean": 1.0, "effective_count": null}),
+        )
+    };
+    json!({"region": "global", "unit": "°C", "of": side(of), "minus": side(minus), "difference": 0.0,
+        "standard_error": null, "p_value": null, "notes": []})
+}
+
+fn hovmoller(of: &Version) -> Value {
+    cited(
+        of,
+        json!({"along": "lat", "band_deg": 90.0, "bounds_deg": [-180.0, -90.0, 180.0, 90.0],
+        "step": "month", "earth": "wgs84", "bands": [{"low_deg": -90.0, "high_deg": 0.0, "area_m2": 2.5e14},
+            {"low_deg": 0.0, "high_deg": 90.0, "area_m2": 0.0}],
+        "rows": [{"start": "2000-01-01T00:00:00Z", "end": "2000-02-01T00:00:00Z", "means": [1.5, null],
+            "coverage_percent": [100.0, 0.0]}]}),
+    )
 }
 
 fn ocean_source(ocean: Option<&Manifest>) -> String {

@@ -4,6 +4,7 @@
     reason = "a test that cannot go on fails, in its helpers as in itself"
 )]
 
+mod analysis;
 mod annotations;
 mod app;
 mod area;

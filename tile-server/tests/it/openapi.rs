@@ -20,7 +20,7 @@ const COMMITTED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/openapi.json");
 const ROUTER: &str = include_str!("../../src/router.rs");
 
 /// One address of every operation, and what is sent along.
-const ASKED: [(&str, &str); 21] = [
+const ASKED: [(&str, &str); 25] = [
     (
         "/tiles/{product}/{mode}/{z}/{x}/{y}.png",
         "/tiles/flux/volume/1/0/1@2x.png",
@@ -51,6 +51,22 @@ const ASKED: [(&str, &str); 21] = [
     (
         "/api/products/{product}/area",
         "/api/products/sst/area?region=global",
+    ),
+    (
+        "/api/products/{product}/analysis",
+        "/api/products/sst/analysis?region=global&parts=trend,climatology",
+    ),
+    (
+        "/api/products/{product}/correlation",
+        "/api/products/sst/correlation?with=flux&region=global",
+    ),
+    (
+        "/api/products/{product}/difference",
+        "/api/products/sst/difference?minus=flux&region=global",
+    ),
+    (
+        "/api/products/{product}/hovmoller",
+        "/api/products/sst/hovmoller?along=lat",
     ),
     (
         "/api/products/{product}/budget",

@@ -1,0 +1,193 @@
+//! Means of a field over bands of latitude or longitude.
+
+use std::ops::Range;
+
+use contract::analysis::Along;
+use contract::earth::Earth;
+use contract::grid::Grid;
+
+/// Rounding of band's edges, in bands.
+const EDGE_SLACK: f64 = 1e-9;
+
+/// The bands of a grid: which cells lie in which.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Bands {
+    /// What they lie along.
+    along: Along,
+    /// Rows whose middles lie inside.
+    rows: Range<u32>,
+    /// Whether the middle of each column lies inside.
+    cols: Vec<bool>,
+    /// Band of each row, or of each column.
+    band_of: Vec<Option<usize>>,
+    /// Area of a cell of each row, m².
+    area_m2: Vec<f64>,
+    /// Lower and upper edges, degrees.
+    edges_deg: Vec<(f64, f64)>,
+}
+
+/// Sum of a band.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct BandSum {
+    /// Values by area.
+    pub weighted: f64,
+    /// Area of cells with data, m².
+    pub area_m2: f64,
+}
+
+impl Bands {
+    /// The bands of `band_deg` degrees, on multiples of it, that cells with their middles between west, south, east and north lie in.
+    pub fn of(
+        grid: &Grid,
+        along: Along,
+        band_deg: f64,
+        bounds_deg: [f64; 4],
+        earth: Earth,
+    ) -> Self {
+        let [west, south, east, north] = bounds_deg;
+        let middle_lat = |row: u32| 0.5 * (grid.row_north_deg(row) + grid.row_north_deg(row + 1));
+        let is_inside = |row: &u32| (south..=north).contains(&middle_lat(*row));
+        let rows: Vec<u32> = (0..grid.rows).filter(is_inside).collect();
+        let rows = rows.first().map_or(0, |row| *row)..rows.last().map_or(0, |row| row + 1);
+        // East of west, so that bands do not break at the date line.
+        let middle_lon = |col: u32| {
+            let middle = grid.col_west_deg(col) + 0.5 * grid.dlon_deg;
+            west + (middle - west).rem_euclid(360.0)
+        };
+        let cols: Vec<bool> = (0..grid.cols).map(|col| middle_lon(col) <= east).collect();
+        let middles: Vec<Option<f64>> = match along {
+            Along::Lat => (0..grid.rows)
+                .map(|row| rows.contains(&row).then(|| middle_lat(row)))
+                .collect(),
+            Along::Lon => (0..grid.cols)
+                .map(|col| cols[col as usize].then(|| middle_lon(col)))
+                .collect(),
+        };
+        let number = |middle: f64| (middle / band_deg + EDGE_SLACK).floor();
+        let numbers = || middles.iter().flatten().map(|middle| number(*middle));
+        let (low, high) = numbers().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), n| {
+            (a.min(n), b.max(n))
+        });
+        let count = if low <= high {
+            (high - low) as usize + 1
+        } else {
+            0
+        };
+        let edge = |band: usize| (low + band as f64) * band_deg;
+        Self {
+            along,
+            rows,
+            band_of: middles
+                .iter()
+                .map(|middle| middle.map(|middle| (number(middle) - low) as usize))
+                .collect(),
+            area_m2: (0..grid.rows)
+                .map(|row| grid.cell_area_m2(row, earth))
+                .collect(),
+            edges_deg: (0..count)
+                .map(|band| (edge(band), edge(band + 1)))
+                .collect(),
+            cols,
+        }
+    }
+
+    /// Lower and upper edge of each band, degrees, from the south or the west.
+    pub fn edges_deg(&self) -> &[(f64, f64)] {
+        &self.edges_deg
+    }
+
+    /// Sums of a field over each band: `values` are `[row, col]`, NaN no data, any unit. In the order of rows, so that the same
+    /// field has the same bits.
+    pub fn sums(&self, values: &[f32]) -> Vec<BandSum> {
+        let mut sums = vec![BandSum::default(); self.edges_deg.len()];
+        let width = self.cols.len();
+        for row in self.rows.clone() {
+            let area_m2 = self.area_m2[row as usize];
+            let cells = &values[row as usize * width..][..width];
+            for (col, value) in cells.iter().enumerate() {
+                if value.is_nan() || !self.cols[col] {
+                    continue;
+                }
+                let at = match self.along {
+                    Along::Lat => row as usize,
+                    Along::Lon => col,
+                };
+                if let Some(sum) = self.band_of[at].and_then(|band| sums.get_mut(band)) {
+                    sum.weighted += area_m2 * f64::from(*value);
+                    sum.area_m2 += area_m2;
+                }
+            }
+        }
+        sums
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const GRID: Grid = Grid {
+        rows: 4,
+        cols: 6,
+        north_deg: 2.0,
+        west_deg: 177.0,
+        dlat_deg: 1.0,
+        dlon_deg: 1.0,
+    };
+
+    #[test]
+    fn bands_are_area_weighted_means_of_the_cells_in_them() {
+        let values: Vec<f32> = (0..24)
+            .map(|i| if i == 8 { f32::NAN } else { i as f32 })
+            .collect();
+        let bands = Bands::of(
+            &GRID,
+            Along::Lat,
+            2.0,
+            [-180.0, -90.0, 180.0, 90.0],
+            Earth::Sphere,
+        );
+        assert_eq!(bands.edges_deg(), [(-2.0, 0.0), (0.0, 2.0)]);
+        let sums = bands.sums(&values);
+        // Rows 0 and 1 of the sphere: areas as sin 2 - sin 1 and sin 1 - sin 0.
+        let area = |north: f64| north.to_radians().sin() - (north - 1.0).to_radians().sin();
+        let [a, b] = [area(2.0), area(1.0)];
+        let upper = (a * 15.0 + b * (51.0 - 8.0)) / (a * 6.0 + b * 5.0);
+        assert!((sums[1].weighted / sums[1].area_m2 / upper - 1.0).abs() < 1e-12);
+        let all = Grid { rows: 4, ..GRID }.cell_area_m2(0, Earth::Sphere);
+        assert!((sums[1].area_m2 / (all * (6.0 + 5.0 * b / a)) - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn bands_of_longitude_go_on_across_the_date_line() {
+        let values: Vec<f32> = (0..24).map(|i| (i % 6) as f32).collect();
+        let bands = Bands::of(
+            &GRID,
+            Along::Lon,
+            1.0,
+            [178.0, -1.0, 182.0, 1.0],
+            Earth::Wgs84,
+        );
+        assert_eq!(bands.edges_deg()[0], (178.0, 179.0));
+        assert_eq!(bands.edges_deg().len(), 4);
+        let means: Vec<f64> = bands
+            .sums(&values)
+            .iter()
+            .map(|s| s.weighted / s.area_m2)
+            .collect();
+        assert!(
+            means
+                .iter()
+                .zip([1.0, 2.0, 3.0, 4.0])
+                .all(|(a, b)| (a - b).abs() < 1e-12)
+        );
+        let nowhere = Bands::of(
+            &GRID,
+            Along::Lat,
+            1.0,
+            [0.0, 50.0, 10.0, 60.0],
+            Earth::Wgs84,
+        );
+        assert!(nowhere.edges_deg().is_empty() && nowhere.sums(&values).is_empty());
+    }
+}

@@ -1,0 +1,129 @@
+//! Mean, spread and count of each part of the year, and how far steps are from them.
+
+use std::collections::BTreeSet;
+
+use contract::analysis::{
+    Anomalies, AnomalyRow, BasePeriod, CalendarBins, Climatology, ClimatologyRow,
+};
+use contract::time::Period;
+
+use super::timeline::longest_s;
+use super::undefined::Undefined;
+
+/// The climatology of a series over the years of `base`, those of the series if absent.
+///
+/// `periods` are in the order of time, `values` beside them, NaN no data, any unit. A step belongs to the bin and the year of
+/// its middle. Spread is the standard deviation with the divisor n - 1.
+///
+/// # Errors
+/// Steps longer than a bin, no data, no data in the base period.
+pub fn climatology(
+    periods: &[Period],
+    values: &[f64],
+    bins: CalendarBins,
+    base: Option<BasePeriod>,
+) -> Result<Climatology, Undefined> {
+    let step_s = longest_s(periods);
+    if step_s > bins.longest_step_s() {
+        return Err(Undefined::StepTooLong {
+            what: "a climatology",
+            step_days: step_s / 86_400.0,
+            bin: bins.as_str(),
+        });
+    }
+    let (Some(first), Some(last)) = (periods.first(), periods.last()) else {
+        return Err(Undefined::NoData);
+    };
+    let covered = BasePeriod::around(Period {
+        start: first.start,
+        end: last.end,
+    });
+    let base = base.unwrap_or(covered);
+    let window = base.period();
+    let mut members: Vec<Vec<f64>> = vec![vec![]; bins.count()];
+    let mut years: Vec<BTreeSet<i32>> = vec![BTreeSet::new(); bins.count()];
+    for (period, value) in periods.iter().zip(values) {
+        let mid = period.mid();
+        if value.is_nan() || mid < window.start || mid >= window.end {
+            continue;
+        }
+        let bin = bins.of(*period);
+        members[bin].push(*value);
+        years[bin].insert(mid.year_month().0);
+    }
+    if members.iter().all(Vec::is_empty) {
+        return Err(if values.iter().all(|value| value.is_nan()) {
+            Undefined::NoData
+        } else {
+            Undefined::NothingInBase {
+                base: base.to_string(),
+                covered: covered.to_string(),
+            }
+        });
+    }
+    let row = |(bin, members): (usize, &Vec<f64>)| ClimatologyRow {
+        bin: bins.title(bin),
+        mean: mean(members),
+        spread: spread(members),
+        count: members.len() as u64,
+        years: years[bin].len() as u64,
+    };
+    let rows = members.iter().enumerate().map(row).collect();
+    Ok(Climatology { bins, base, rows })
+}
+
+/// How far each step is from a climatology of the same bins; any unit.
+pub fn anomalies(periods: &[Period], values: &[f64], climatology: &Climatology) -> Anomalies {
+    let bins = climatology.bins;
+    let row = |(period, value): (&Period, &f64)| {
+        let of_bin = &climatology.rows[bins.of(*period)];
+        let value = (!value.is_nan()).then_some(*value);
+        let anomaly = value.zip(of_bin.mean).map(|(value, mean)| value - mean);
+        let spread = of_bin.spread.filter(|spread| *spread > 0.0);
+        AnomalyRow {
+            start: period.start,
+            end: period.end,
+            mid: period.mid(),
+            value,
+            normal: of_bin.mean,
+            anomaly,
+            standardised: anomaly
+                .zip(spread)
+                .map(|(anomaly, spread)| anomaly / spread),
+        }
+    };
+    Anomalies {
+        bins,
+        base: climatology.base,
+        rows: periods.iter().zip(values).map(row).collect(),
+    }
+}
+
+/// Values less the mean of their calendar month over the whole series, NaN no data.
+pub fn deseasonalised(periods: &[Period], values: &[f64]) -> Vec<f64> {
+    let (mut sums, mut counts) = ([0.0; 12], [0.0; 12]);
+    let month = |period: &Period| CalendarBins::Month.of(*period);
+    for (period, value) in periods.iter().zip(values).filter(|(_, v)| !v.is_nan()) {
+        sums[month(period)] += value;
+        counts[month(period)] += 1.0;
+    }
+    let less =
+        |(period, value): (&Period, &f64)| value - sums[month(period)] / counts[month(period)];
+    periods.iter().zip(values).map(less).collect()
+}
+
+/// Mean of values; none of none.
+pub fn mean(values: &[f64]) -> Option<f64> {
+    let sum: f64 = values.iter().sum();
+    (!values.is_empty()).then(|| sum / values.len() as f64)
+}
+
+/// Standard deviation with the divisor n - 1; none of fewer than two. In two passes, so that large means cost no digits.
+pub fn spread(values: &[f64]) -> Option<f64> {
+    let mean = mean(values).filter(|_| values.len() > 1)?;
+    let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
+    Some((squares / (values.len() - 1) as f64).sqrt())
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,77 @@
+//! How two series on common steps go together, now and later.
+
+use contract::analysis::CorrelationRow;
+
+use super::autocorrelation::autocorrelation;
+use super::distribution::student_two_sided;
+
+/// Pairs from which a correlation is one.
+const LEAST_PAIRS: usize = 3;
+
+/// The correlation of two series at lags from `-max_lag` to `max_lag` steps; the second is read `lag` steps after the first.
+///
+/// Both hold one value for each of the same steps at equal distances, NaN no data, any unit. Pearson's over the pairs there
+/// are; effective pairs after Bretherton et al. (1999), doi:10.1175/1520-0442(1999)012<1990:TENOSD>2.0.CO;2, equation 31.
+pub fn correlations(first: &[f64], second: &[f64], max_lag: u32) -> Vec<CorrelationRow> {
+    let together = autocorrelation(first, 1) * autocorrelation(second, 1);
+    let max_lag = i32::try_from(max_lag).unwrap_or(i32::MAX);
+    (-max_lag..=max_lag)
+        .map(|lag| at_lag(first, second, lag, together))
+        .collect()
+}
+
+fn at_lag(first: &[f64], second: &[f64], lag: i32, together: f64) -> CorrelationRow {
+    let by = lag.unsigned_abs() as usize;
+    let skipped = |values: &'_ [f64], by: usize| values.get(by..).unwrap_or_default().to_vec();
+    let (a, b) = if lag >= 0 {
+        (first.to_vec(), skipped(second, by))
+    } else {
+        (skipped(first, by), second.to_vec())
+    };
+    let pairs: Vec<(f64, f64)> = a
+        .into_iter()
+        .zip(b)
+        .filter(|(a, b)| !a.is_nan() && !b.is_nan())
+        .collect();
+    let correlation = pearson(&pairs);
+    let together = together.max(0.0);
+    let effective = pairs.len() as f64 * (1.0 - together) / (1.0 + together);
+    let p_value = correlation.and_then(|r| {
+        let freedom = effective - 2.0;
+        let spread = 1.0 - r * r;
+        if spread <= 0.0 {
+            // All pairs lie on a line.
+            return (freedom > 0.0).then_some(0.0);
+        }
+        student_two_sided(r * (freedom.max(0.0) / spread).sqrt(), freedom)
+    });
+    CorrelationRow {
+        lag_steps: lag,
+        count: pairs.len() as u64,
+        correlation,
+        effective_count: correlation.map(|_| effective),
+        p_value,
+    }
+}
+
+/// Pearson's correlation of pairs, none NaN; none with fewer than three, or where one side does not vary.
+fn pearson(pairs: &[(f64, f64)]) -> Option<f64> {
+    let n = pairs.len();
+    if n < LEAST_PAIRS {
+        return None;
+    }
+    let mean = |of: fn(&(f64, f64)) -> f64| pairs.iter().map(of).sum::<f64>() / n as f64;
+    let (mean_a, mean_b) = (mean(|p| p.0), mean(|p| p.1));
+    let (mut aa, mut bb, mut ab) = (0.0, 0.0, 0.0);
+    for (a, b) in pairs {
+        let (a, b) = (a - mean_a, b - mean_b);
+        aa += a * a;
+        bb += b * b;
+        ab += a * b;
+    }
+    let spread = (aa * bb).sqrt();
+    (spread > 0.0).then(|| (ab / spread).clamp(-1.0, 1.0))
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,196 @@
+//! Latitude or longitude against time: a version of a product and bands in, their means step by step out.
+
+use std::sync::Arc;
+
+use contract::ContractError;
+use contract::analysis::{Along, Cited, Hovmoller, HovmollerBand, HovmollerQuery, HovmollerRow};
+use contract::grid::Grid;
+use contract::manifest::{Manifest, Step};
+use contract::time::Period;
+use futures::{StreamExt as _, TryStreamExt as _};
+use storage::{Store, domain, fields};
+
+use super::bands::{BandSum, Bands};
+use super::read::Version;
+use super::timeline::{bins_over, no_shorter};
+use crate::ComputeError;
+
+/// Means in one answer: 5 MiB as text.
+const MOST_MEANS: usize = 400_000;
+/// Fields that are read at the same time: one is decoded while another comes.
+const FIELDS_AT_ONCE: usize = 2;
+/// Heights of bands that are chosen where nobody chose one, degrees.
+const BANDS_DEG: [f64; 4] = [1.0, 2.0, 5.0, 10.0];
+
+/// The means of bands of a version of a product against time.
+///
+/// Fields are read one after the other, two at a time. Each counts by area and time: the mean of a month is that of all its
+/// cells with data over all its time, so that a cell that is seen once counts by the step that saw it.
+///
+/// # Errors
+/// No step in the period, nothing of the grid inside the bounds, bands below the size of cells, more means than one answer holds.
+pub async fn hovmoller(
+    store: &Store,
+    (manifest, id): Version<'_>,
+    query: &HovmollerQuery,
+) -> Result<Hovmoller, ComputeError> {
+    let (_window, steps) = manifest.steps_inside(query.from, query.to)?;
+    let grid = &manifest.grid;
+    let band_deg = band_deg(grid, query)?;
+    let bounds_deg = bounds_deg(grid, query)?;
+    let bands = Bands::of(grid, query.along, band_deg, bounds_deg, query.earth);
+    if bands.edges_deg().is_empty() {
+        let reason = format!(
+            "no cell of {} has its middle in it; it covers {}",
+            manifest.product,
+            manifest.bounds_text()
+        );
+        let text = bounds_deg.map(|edge| edge.to_string()).join(",");
+        return Err(ContractError::invalid("region", &text, reason).into());
+    }
+    let periods: Vec<Period> = steps.iter().map(|step| step.period).collect();
+    let step = no_shorter(&periods, query.step);
+    let bins = bins_over(&periods, step);
+    let means = bins.len().saturating_mul(bands.edges_deg().len());
+    if means > MOST_MEANS {
+        let reason = format!(
+            "{means} means are more than an answer's {MOST_MEANS}: ask for longer steps, wider bands or a shorter period"
+        );
+        return Err(ContractError::invalid("step", step.as_str(), reason).into());
+    }
+    let bands = Arc::new(bands);
+    let areas_m2 = domain_areas(store, manifest, &bands).await?;
+    let sums = sums_in(store, manifest, &steps, &bands, &bins).await?;
+    let display = manifest.quantity.display();
+    let row = |(bin, sums): (&Period, &Vec<BandSum>)| HovmollerRow {
+        start: bin.start,
+        end: bin.end,
+        means: sums
+            .iter()
+            .map(|sum| (sum.area_m2 > 0.0).then(|| display.shown(sum.weighted / sum.area_m2)))
+            .collect(),
+        coverage_percent: sums
+            .iter()
+            .zip(&areas_m2)
+            .map(|(sum, area_m2)| {
+                let all = area_m2 * bin.seconds();
+                if all > 0.0 {
+                    (100.0 * sum.area_m2 / all).min(100.0)
+                } else {
+                    0.0
+                }
+            })
+            .collect(),
+    };
+    let band = |((low_deg, high_deg), area_m2): (&(f64, f64), &f64)| HovmollerBand {
+        low_deg: *low_deg,
+        high_deg: *high_deg,
+        area_m2: *area_m2,
+    };
+    Ok(Hovmoller {
+        cited: Cited::of(manifest, id.clone()),
+        along: query.along,
+        band_deg,
+        bounds_deg,
+        step,
+        earth: query.earth,
+        bands: bands.edges_deg().iter().zip(&areas_m2).map(band).collect(),
+        rows: bins.iter().zip(&sums).map(row).collect(),
+    })
+}
+
+fn band_deg(grid: &Grid, query: &HovmollerQuery) -> Result<f64, ContractError> {
+    let cell_deg = match query.along {
+        Along::Lat => grid.dlat_deg,
+        Along::Lon => grid.dlon_deg,
+    };
+    // Steps of grids come from rounded coordinates.
+    let least = cell_deg * (1.0 - 1e-6);
+    match query.band_deg {
+        None => Ok(BANDS_DEG
+            .into_iter()
+            .find(|band| *band >= least)
+            .unwrap_or(cell_deg)),
+        Some(band) if band.is_finite() && band >= least && band <= 180.0 => Ok(band),
+        Some(band) => {
+            let reason = format!("from the size of a cell, {cell_deg}, to 180 degrees");
+            Err(ContractError::invalid("band", &band.to_string(), reason))
+        }
+    }
+}
+
+fn bounds_deg(grid: &Grid, query: &HovmollerQuery) -> Result<[f64; 4], ContractError> {
+    let Some(bounds) = query.bounds_deg else {
+        return Ok(grid.shown_bounds_deg());
+    };
+    let [west, south, east, north] = bounds;
+    let is_one = bounds.iter().all(|edge| edge.is_finite())
+        && (-90.0..=90.0).contains(&south)
+        && (-90.0..=90.0).contains(&north)
+        && south < north
+        && west < east
+        && east - west <= 360.0;
+    if is_one {
+        return Ok(bounds);
+    }
+    let text = bounds.map(|edge| edge.to_string()).join(",");
+    let valid = "west,south,east,north in degrees, at most once around";
+    Err(ContractError::invalid("region", &text, valid))
+}
+
+/// Area of the cells of each band that hold data in some step, m².
+async fn domain_areas(
+    store: &Store,
+    manifest: &Manifest,
+    bands: &Bands,
+) -> Result<Vec<f64>, ComputeError> {
+    let cells = domain::read(store, &manifest.domain).await?;
+    if cells.len() != manifest.grid.cell_count() {
+        let what = manifest.domain.to_string();
+        return Err(ComputeError::inconsistent(
+            what,
+            "it does not fill its product's grid",
+        ));
+    }
+    let ones: Vec<f32> = cells
+        .iter()
+        .map(|held| if *held { 1.0 } else { f32::NAN })
+        .collect();
+    Ok(bands.sums(&ones).iter().map(|sum| sum.area_m2).collect())
+}
+
+/// Sums of each bin and band, by area and seconds.
+async fn sums_in(
+    store: &Store,
+    manifest: &Manifest,
+    steps: &[&Step],
+    bands: &Arc<Bands>,
+    bins: &[Period],
+) -> Result<Vec<Vec<BandSum>>, ComputeError> {
+    let of_step = |step: &Step| {
+        let (period, field, bands) = (step.period, step.field.clone(), Arc::clone(bands));
+        async move {
+            let values = fields::read(store, &field, &manifest.grid).await?;
+            let sums = tokio::task::spawn_blocking(move || bands.sums(&values)).await;
+            let sums = sums.map_err(|e| ComputeError::inconsistent(field.to_string(), e))?;
+            Ok::<_, ComputeError>((period, sums))
+        }
+    };
+    let read: Vec<_> = steps.iter().map(|step| of_step(step)).collect();
+    let mut read = futures::stream::iter(read).buffered(FIELDS_AT_ONCE);
+    let mut all = vec![vec![BandSum::default(); bands.edges_deg().len()]; bins.len()];
+    // In the order of time, so that sums have the same bits each time.
+    while let Some((period, sums)) = read.try_next().await? {
+        let from = bins.partition_point(|bin| bin.end <= period.start);
+        let touched = bins.iter().zip(&mut all).skip(from);
+        for (bin, all) in touched.take_while(|(bin, _)| bin.start < period.end) {
+            let shared_ms = period.end.min(bin.end).ms() - period.start.max(bin.start).ms();
+            let seconds = shared_ms as f64 / 1000.0;
+            for (all, sum) in all.iter_mut().zip(&sums) {
+                all.weighted += sum.weighted * seconds;
+                all.area_m2 += sum.area_m2 * seconds;
+            }
+        }
+    }
+    Ok(all)
+}

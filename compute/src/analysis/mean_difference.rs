@@ -1,0 +1,106 @@
+//! Means of series over time, and whether two of them differ by more than chance.
+
+use contract::time::Period;
+
+use super::autocorrelation::{autocorrelation, effective_count};
+use super::distribution::student_two_sided;
+
+/// Mean of a series over time, and what is known of its error.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MeanOverTime {
+    /// Steps with data.
+    pub count: usize,
+    /// Each step by its length; none without data.
+    pub mean: Option<f64>,
+    /// Effective number of steps; none of fewer than two.
+    pub effective_count: Option<f64>,
+    /// Variance of the mean by the spread of `about`.
+    variance: Option<f64>,
+}
+
+/// The mean of `values` (beside `periods`, NaN no data, any unit) over time. Its error comes from the spread of `about`, one
+/// beside each value: the values less what is no chance in them, such as their seasons.
+pub fn mean_over_time(periods: &[Period], values: &[f64], about: &[f64]) -> MeanOverTime {
+    let (mut sum, mut seconds, mut count) = (0.0, 0.0, 0);
+    for (period, value) in periods.iter().zip(values).filter(|(_, v)| !v.is_nan()) {
+        sum += value * period.seconds();
+        seconds += period.seconds();
+        count += 1;
+    }
+    let present: Vec<f64> = about.iter().copied().filter(|v| !v.is_nan()).collect();
+    let spread = super::climatology::spread(&present);
+    let effective = spread.map(|_| effective_count(count, autocorrelation(about, 1)));
+    MeanOverTime {
+        count,
+        mean: (count > 0).then(|| sum / seconds),
+        effective_count: effective,
+        variance: spread.zip(effective).map(|(spread, n)| spread * spread / n),
+    }
+}
+
+/// Standard error of the difference of two means, and the chance of one as large where there is none: Welch (1947),
+/// doi:10.1093/biomet/34.1-2.28, with effective numbers. None where either side has fewer than two steps, or no degree of freedom.
+pub fn welch(a: &MeanOverTime, b: &MeanOverTime) -> Option<(f64, Option<f64>)> {
+    let (va, vb) = (a.variance?, b.variance?);
+    let (na, nb) = (a.effective_count?, b.effective_count?);
+    let error = (va + vb).sqrt();
+    let difference = a.mean? - b.mean?;
+    if error <= 0.0 {
+        return Some((0.0, None));
+    }
+    let freedom = (va + vb).powi(2) / (va * va / (na - 1.0) + vb * vb / (nb - 1.0));
+    let p_value = (na > 1.0 && nb > 1.0)
+        .then(|| student_two_sided(difference / error, freedom))
+        .flatten();
+    Some((error, p_value))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn months(count: u32) -> Vec<Period> {
+        (0..count)
+            .map(|m| Period::month(2001 + (m / 12) as i32, m % 12 + 1).unwrap())
+            .collect()
+    }
+
+    #[test]
+    fn steps_count_by_their_length() {
+        let year = months(12);
+        let values: Vec<f64> = (0..12).map(|m| if m == 1 { 1.0 } else { 0.0 }).collect();
+        let found = mean_over_time(&year, &values, &values);
+        assert!((found.mean.unwrap() - 28.0 / 365.0).abs() < 1e-15);
+        assert_eq!(
+            mean_over_time(&year, &[f64::NAN; 12], &[f64::NAN; 12]).mean,
+            None
+        );
+    }
+
+    /// What `scipy.stats.ttest_ind(equal_var=False)` prints of the same values, alternating so that none is worth less than one:
+    /// `tests/reference/series_statistics.py`.
+    #[test]
+    fn the_test_of_values_on_their_own_is_that_of_an_independent_library() {
+        let days: Vec<Period> = (1..=8)
+            .map(|d| {
+                let start = format!("2001-01-{d:02}").parse().unwrap();
+                let end = format!("2001-01-{:02}", d + 1).parse().unwrap();
+                Period::new(start, end).unwrap()
+            })
+            .collect();
+        let a = [1.0, 3.0, 0.5, 2.5, 1.5, 3.5, 0.0, 4.0];
+        let b = [2.0, 5.0, 3.0, 6.0, 2.5, 4.5];
+        let (a, b) = (
+            mean_over_time(&days, &a, &a),
+            mean_over_time(&days[..6], &b, &b),
+        );
+        let (error, p_value) = welch(&a, &b).unwrap();
+        assert!(
+            (error - WELCH.0).abs() < 1e-12 && (p_value.unwrap() - WELCH.1).abs() < 1e-9,
+            "{error} {p_value:?}"
+        );
+    }
+
+    /// Error and chance.
+    const WELCH: (f64, f64) = (0.823_995_299_724_612_5, 0.049_135_436_811_265_81);
+}

@@ -1,0 +1,84 @@
+//! What is made of one series: a version of a product, a place or region and a period in; climatology, anomaly, trend, season
+//! and extremes out, each or the reason why there is none.
+
+use contract::analysis::{AnalysisOptions, AnalysisPart, Refused, SeriesAnalysis, SeriesQuery};
+
+use super::climatology::{anomalies, climatology};
+use super::extremes::extremes;
+use super::harmonics::season;
+use super::read::{self, ReadSeries, Version};
+use super::trend::trend;
+use super::undefined::Undefined;
+use crate::{ComputeError, Engine};
+
+/// The analysis of a version of a product.
+///
+/// # Errors
+/// Those of reading the series. What is not defined for it is said in the answer.
+pub async fn analyse(
+    engine: &Engine,
+    of: Version<'_>,
+    query: &SeriesQuery,
+    options: &AnalysisOptions,
+) -> Result<SeriesAnalysis, ComputeError> {
+    let read = read::series(engine, of, query).await?;
+    let options = options.clone();
+    // Pairs of thousands of steps take a moment.
+    tokio::task::spawn_blocking(move || made_of(read, &options))
+        .await
+        .map_err(|e| ComputeError::inconsistent("analysis", e))
+}
+
+fn made_of(read: ReadSeries, options: &AnalysisOptions) -> SeriesAnalysis {
+    let extent = read.extent();
+    let value_count = read.value_count() as u64;
+    let ReadSeries {
+        cited,
+        place,
+        periods,
+        values,
+        notes,
+    } = read;
+    let mut answer = SeriesAnalysis {
+        start: extent.start,
+        end: extent.end,
+        step_count: periods.len() as u64,
+        value_count,
+        notes,
+        refused: vec![],
+        climatology: None,
+        anomaly: None,
+        trend: None,
+        season: None,
+        extremes: None,
+        cited,
+        place,
+    };
+    for part in &options.parts {
+        let made = match part {
+            AnalysisPart::Climatology => climatology(&periods, &values, options.bins, options.base)
+                .map(|made| answer.climatology = Some(made)),
+            AnalysisPart::Anomaly => climatology(&periods, &values, options.bins, options.base)
+                .map(|normal| answer.anomaly = Some(anomalies(&periods, &values, &normal))),
+            AnalysisPart::Trend => trend(&periods, &values, options.trend_step, &answer.cited.unit)
+                .map(|made| answer.trend = Some(made)),
+            AnalysisPart::Season => {
+                season(&periods, &values).map(|made| answer.season = Some(made))
+            }
+            AnalysisPart::Extremes => {
+                extremes(&periods, &values).map(|made| answer.extremes = Some(made))
+            }
+        };
+        answer
+            .refused
+            .extend(made.err().map(|e| refused(*part, &e)));
+    }
+    answer
+}
+
+fn refused(part: AnalysisPart, why: &Undefined) -> Refused {
+    Refused {
+        part,
+        reason: why.to_string(),
+    }
+}

@@ -1,0 +1,103 @@
+//! Values of given ranks out of a great many that nobody keeps: exact, in bounded memory.
+
+use std::collections::BTreeMap;
+
+/// Values that are sorted rather than counted: 8 MiB of them.
+pub const SORTED_AT_MOST: usize = 1 << 20;
+/// Bits of a digit.
+const DIGIT_BITS: u32 = 16;
+
+/// The values of the given ranks (from 0, the lowest) among `count` values, exact.
+///
+/// `values` gives the same values in the same order each time it is called, none of them NaN. Few are sorted. Of many the
+/// digits are counted from the highest on, 16 bits a pass, for each rank among those that share its digits so far: four
+/// passes and half a MiB a rank, whatever their number.
+pub fn at_ranks<I: Iterator<Item = f64>>(
+    values: impl Fn() -> I,
+    count: usize,
+    ranks: &[usize],
+    sorted_at_most: usize,
+) -> Vec<f64> {
+    assert!(
+        ranks.iter().all(|rank| *rank < count),
+        "ranks are below the number of values"
+    );
+    if count <= sorted_at_most {
+        let mut sorted: Vec<f64> = values().collect();
+        sorted.sort_unstable_by(f64::total_cmp);
+        return ranks.iter().map(|rank| sorted[*rank]).collect();
+    }
+    // Of each rank: the digits found so far, and its rank among the values that have them.
+    let mut found: Vec<(u64, usize)> = ranks.iter().map(|rank| (0, *rank)).collect();
+    for pass in 1..=u64::BITS / DIGIT_BITS {
+        let shift = u64::BITS - pass * DIGIT_BITS;
+        let mut counts: BTreeMap<u64, Vec<usize>> = BTreeMap::new();
+        for (digits, _) in &found {
+            counts
+                .entry(*digits)
+                .or_insert_with(|| vec![0; 1 << DIGIT_BITS]);
+        }
+        for value in values() {
+            let key = ordered(value) >> shift;
+            if let Some(counts) = counts.get_mut(&(key >> DIGIT_BITS)) {
+                counts[(key & ((1 << DIGIT_BITS) - 1)) as usize] += 1;
+            }
+        }
+        for (digits, rank) in &mut found {
+            let counts = &counts[digits];
+            let mut digit = 0;
+            while *rank >= counts[digit] {
+                *rank -= counts[digit];
+                digit += 1;
+            }
+            *digits = (*digits << DIGIT_BITS) | digit as u64;
+        }
+    }
+    found
+        .iter()
+        .map(|(digits, _)| of_ordered(*digits))
+        .collect()
+}
+
+/// Bits whose order as whole numbers is that of the values.
+fn ordered(value: f64) -> u64 {
+    // Both zeros are one.
+    let bits = (value + 0.0).to_bits();
+    if bits >> 63 == 1 {
+        !bits
+    } else {
+        bits | (1 << 63)
+    }
+}
+
+fn of_ordered(bits: u64) -> f64 {
+    f64::from_bits(if bits >> 63 == 1 {
+        bits & !(1 << 63)
+    } else {
+        !bits
+    })
+}
+
+#[cfg(test)]
+#[expect(
+    clippy::float_cmp,
+    reason = "selected values are values that were given"
+)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn counted_digits_find_what_sorting_finds(
+            values in prop::collection::vec(prop_oneof![-1e3..1e3f64, Just(0.0), Just(-0.0), Just(7.5), any::<f64>().prop_filter("a number", |v| !v.is_nan())], 1..60),
+            seed in any::<u64>(),
+        ) {
+            let count = values.len();
+            let ranks = [0, count - 1, seed as usize % count, count / 2];
+            let sorted = at_ranks(|| values.iter().copied(), count, &ranks, usize::MAX);
+            let counted = at_ranks(|| values.iter().copied(), count, &ranks, 0);
+            prop_assert_eq!(sorted, counted);
+        }
+    }
+}

@@ -1,0 +1,121 @@
+//! Steps as points in time, years apart, and their means over common bins.
+
+use contract::analysis::{CalendarBins, MeanStep};
+use contract::time::Period;
+
+/// Milliseconds in a Julian year of 365.25 days.
+pub const YEAR_MS: f64 = 365.25 * 86_400_000.0;
+/// Share of a bin's time that must hold data for its mean to count.
+const LEAST_SHARE: f64 = 0.5;
+
+/// Middles of periods, years of 365.25 days after the first one's.
+pub fn middles_years(periods: &[Period]) -> Vec<f64> {
+    let first_ms = periods.first().map_or(0, |period| period.mid().ms());
+    let years = |period: &Period| (period.mid().ms() - first_ms) as f64 / YEAR_MS;
+    periods.iter().map(years).collect()
+}
+
+/// Means of steps over calendar months or years without a gap from the first to the last, NaN where less than half of a
+/// bin's time holds data: each step counts by the time of it that lies in the bin. Steps as they are for `Native`.
+///
+/// `periods` are in the order of time and do not overlap; `values` are beside them, NaN no data, any unit.
+pub fn means_over(periods: &[Period], values: &[f64], step: MeanStep) -> (Vec<Period>, Vec<f64>) {
+    if step == MeanStep::Native {
+        return (periods.to_vec(), values.to_vec());
+    }
+    let bins = bins_over(periods, step);
+    let mut means = Vec::with_capacity(bins.len());
+    let mut from = 0;
+    for bin in &bins {
+        while from < periods.len() && periods[from].end <= bin.start {
+            from += 1;
+        }
+        let inside = periods[from..].iter().zip(&values[from..]);
+        let inside = inside.take_while(|(period, _)| period.start < bin.end);
+        let (mut sum, mut with_data_s) = (0.0, 0.0);
+        for (period, value) in inside.filter(|(_, value)| !value.is_nan()) {
+            let shared_ms = period.end.min(bin.end).ms() - period.start.max(bin.start).ms();
+            let shared_s = shared_ms as f64 / 1000.0;
+            sum += value * shared_s;
+            with_data_s += shared_s;
+        }
+        let is_held = with_data_s >= LEAST_SHARE * bin.seconds();
+        means.push(if is_held { sum / with_data_s } else { f64::NAN });
+    }
+    (bins, means)
+}
+
+/// What steps may be gathered in: months and years that are no shorter than they are, else steps as they are.
+pub fn no_shorter(periods: &[Period], step: MeanStep) -> MeanStep {
+    let longest_s = longest_s(periods);
+    match step {
+        MeanStep::Month if longest_s > CalendarBins::Month.longest_step_s() => MeanStep::Native,
+        MeanStep::Year if longest_s * 1000.0 > YEAR_MS * 1.01 => MeanStep::Native,
+        step => step,
+    }
+}
+
+/// Calendar months or years without a gap that some periods lie in, in the order of time; the periods themselves for `Native`.
+pub fn bins_over(periods: &[Period], step: MeanStep) -> Vec<Period> {
+    match (step, periods.first(), periods.last()) {
+        (MeanStep::Month, Some(first), Some(last)) => bins(*first, *last, Period::month),
+        (MeanStep::Year, Some(first), Some(last)) => {
+            bins(*first, *last, |year, _month| Period::year(year))
+        }
+        _ => periods.to_vec(),
+    }
+}
+
+/// Calendar bins from the one that holds the first instant to the one that holds the last.
+fn bins<E>(first: Period, last: Period, of: impl Fn(i32, u32) -> Result<Period, E>) -> Vec<Period> {
+    let mut bins: Vec<Period> = vec![];
+    let mut at = first.start;
+    while at < last.end {
+        let (year, month) = at.year_month();
+        // The last years that an instant can name have no bin that ends in them.
+        let Ok(bin) = of(year, month) else { break };
+        bins.push(bin);
+        at = bin.end;
+    }
+    bins
+}
+
+/// The longest of some periods, s; 0 of none.
+pub fn longest_s(periods: &[Period]) -> f64 {
+    let lengths = periods.iter().map(|period| period.seconds());
+    lengths.fold(0.0, f64::max)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn period(start: &str, end: &str) -> Period {
+        Period::new(start.parse().unwrap(), end.parse().unwrap()).unwrap()
+    }
+
+    /// By hand: of the eight days from 29 January on three lie in January, five in February.
+    #[test]
+    fn a_step_across_two_months_counts_in_both_by_its_time() {
+        let periods = [
+            period("2001-01-01", "2001-01-29"),
+            period("2001-01-29", "2001-02-06"),
+            period("2001-02-06", "2001-03-01"),
+            period("2001-03-01", "2001-03-10"),
+            period("2001-05-01", "2001-06-01"),
+        ];
+        let values = [10.0, 20.0, f64::NAN, 1.0, 3.0];
+        let (months, means) = means_over(&periods, &values, MeanStep::Month);
+        assert_eq!(months.len(), 5);
+        assert_eq!(months[1], Period::month(2001, 2).unwrap());
+        assert!((means[0] - (28.0 * 10.0 + 3.0 * 20.0) / 31.0).abs() < 1e-12);
+        // 5 of 28 days, 9 of 31, none: no means.
+        assert!(means[1..4].iter().all(|mean| mean.is_nan()));
+        assert!((means[4] - 3.0).abs() < 1e-12);
+        let (years, means) = means_over(&periods, &values, MeanStep::Year);
+        assert_eq!((years.len(), means[0].is_nan()), (1, true));
+        let (as_they_are, _) = means_over(&periods, &values, MeanStep::Native);
+        assert_eq!(as_they_are, periods);
+        assert_eq!(means_over(&[], &[], MeanStep::Month).0.len(), 0);
+    }
+}

@@ -1,0 +1,89 @@
+use super::*;
+use crate::analysis::reference::{SLOW, near};
+
+fn months(count: u32) -> Vec<Period> {
+    (0..count)
+        .map(|m| Period::month(2001 + (m / 12) as i32, m % 12 + 1).unwrap())
+        .collect()
+}
+
+/// A season of ten units and 0.3 a decade.
+fn rising(count: u32) -> Vec<f64> {
+    (0..count)
+        .map(|m| 15.0 + 10.0 * f64::from(m % 12) + 0.03 * f64::from(m / 12))
+        .collect()
+}
+
+#[test]
+fn seasons_are_taken_off_before_slopes_are_sought() {
+    // Ten years and a half: the warm half once more.
+    let found = trend(&months(126), &rising(126), MeanStep::Month, "°C").unwrap();
+    assert!(found.deseasonalised && found.step == MeanStep::Month);
+    assert_eq!(
+        (found.slope_unit.as_str(), found.count),
+        ("°C per decade", 126)
+    );
+    // The line rises in steps of a year, so that most pairs are a little off it.
+    near(found.theil_sen.slope_per_decade, 0.3, 0.05);
+    near(found.least_squares.slope_per_decade, 0.3, 0.05);
+    assert!(found.mann_kendall.p_value < 1e-6 && found.mann_kendall.tau > 0.8);
+    let yearly = trend(&months(120), &rising(120), MeanStep::Year, "").unwrap();
+    assert_eq!(
+        (yearly.count, yearly.slope_unit.as_str()),
+        (10, "per decade")
+    );
+    assert!(!yearly.deseasonalised);
+    near(yearly.theil_sen.slope_per_decade, 0.3, 1e-3);
+    near(yearly.theil_sen.at_mid, yearly.mean, 1e-3);
+}
+
+#[test]
+fn steps_longer_than_months_are_taken_as_they_are() {
+    let years: Vec<Period> = (0..30).map(|y| Period::year(1980 + y).unwrap()).collect();
+    let found = trend(&years, &SLOW, MeanStep::Month, "m").unwrap();
+    assert!(found.step == MeanStep::Native && !found.deseasonalised);
+    near(
+        found.theil_sen.slope_per_decade,
+        0.608_695_652_173_913,
+        1e-3,
+    );
+    near(found.mann_kendall.p_value, 0.0793, 1e-2);
+    // Its interval is the wider one of values that go together.
+    assert!(found.theil_sen.lower_per_decade < 0.0 && found.theil_sen.upper_per_decade > 1.0);
+    // Its residuals wander so that fewer than two of them are worth one of their own: nothing is said.
+    assert!(found.least_squares.effective_count < 2.0, "{found:?}");
+    assert_eq!(found.least_squares.p_value, None);
+}
+
+#[test]
+fn what_has_no_trend_is_refused_with_the_reason() {
+    let refused = |count: u32, values: &[f64], step| {
+        trend(&months(count), values, step, "")
+            .unwrap_err()
+            .to_string()
+    };
+    let short = refused(48, &rising(48), MeanStep::Month);
+    assert_eq!(short, "a trend needs 5 years of values, and they span 4.0");
+    assert_eq!(
+        refused(60, &[f64::NAN; 60], MeanStep::Month),
+        "a trend needs 10 values, and there are 0"
+    );
+    assert_eq!(
+        refused(60, &rising(60), MeanStep::Year),
+        "a trend needs 10 values, and there are 5"
+    );
+    assert!(refused(60, &[3.0; 60], MeanStep::Month).contains("all 60 values are equal"));
+    let mut one = vec![f64::NAN; 60];
+    one[3] = 1.0;
+    assert_eq!(
+        refused(60, &one, MeanStep::Month),
+        "a trend needs 10 values, and there are 1"
+    );
+    // Five years are enough, also where the last month is missing.
+    let mut five = rising(60);
+    five[59] = f64::NAN;
+    assert!(trend(&months(60), &five, MeanStep::Month, "").is_ok());
+    // Seasons alone, and nothing else: no trend, and nothing to tell it from.
+    let seasons: Vec<f64> = (0..72).map(|m| f64::from(m % 12)).collect();
+    assert!(refused(72, &seasons, MeanStep::Month).contains("equal"));
+}

@@ -1,0 +1,322 @@
+//! What is made of series of stored products: at a place and over regions, of one and of two, and of bands.
+
+use compute::analysis::{self, analyse};
+use compute::{Engine, ErrorClass};
+use contract::analysis::{
+    Along, AnalysisOptions, AnalysisPart, CorrelationQuery, HovmollerQuery, MeanStep, SeriesQuery,
+};
+use contract::earth::Earth;
+use contract::grid::{Grid, LonLatDeg};
+use contract::manifest::Manifest;
+use contract::quantity::Quantity;
+use contract::series::RegionSeriesQuery;
+use contract::time::Period;
+use storage::Store;
+
+use crate::fixture::{folder_store, land, parts, product};
+
+/// In the open Pacific, so that all of it is sea.
+const GRID: Grid = Grid {
+    rows: 9,
+    cols: 20,
+    north_deg: -10.0,
+    west_deg: -140.0,
+    dlat_deg: 1.0,
+    dlon_deg: 1.0,
+};
+
+/// Months from 2001 on; every cell has the value of its month, stored unit.
+fn months(count: u32, value: impl Fn(u32, usize) -> f32) -> Vec<(Period, Vec<f32>)> {
+    (0..count)
+        .map(|month| {
+            let period = Period::month(2001 + (month / 12) as i32, month % 12 + 1).unwrap();
+            let cells = (0..GRID.cell_count()).map(|cell| value(month, cell));
+            (period, cells.collect())
+        })
+        .collect()
+}
+
+/// A season and a rise of 0.03 a year, m s⁻¹.
+fn rising(month: u32) -> f32 {
+    3.0 + (month % 12) as f32 + 0.03 * (month / 12) as f32
+}
+
+async fn wind(store: &Store, name: &str, steps: &[(Period, Vec<f32>)]) -> Manifest {
+    land(store, &product(name), Quantity::WindSpeed, GRID, steps, 48).await
+}
+
+fn region(name: &str, region: &str) -> SeriesQuery {
+    let query = RegionSeriesQuery::new(product(name), region.parse().unwrap());
+    SeriesQuery::Region(query)
+}
+
+fn cell(name: &str, lon: f64, lat: f64) -> SeriesQuery {
+    SeriesQuery::Cell {
+        product: product(name),
+        place: LonLatDeg::new(lon, lat).unwrap(),
+        from: None,
+        to: None,
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_region_and_a_cell_of_one_value_have_one_analysis_and_it_is_that_of_the_values() {
+    let (_folder, store) = folder_store();
+    let manifest = wind(&store, "wind", &months(120, |month, _| rising(month))).await;
+    let id = manifest.id();
+    let engine = Engine::in_process(store.clone(), parts(3));
+    let options = AnalysisOptions::new(AnalysisPart::ALL.to_vec()).unwrap();
+    let of = async |query: &SeriesQuery| {
+        analyse(&engine, (&manifest, &id), query, &options)
+            .await
+            .unwrap()
+    };
+    let area = of(&region("wind", "-135,-18,-125,-12")).await;
+    let point = of(&cell("wind", -130.5, -15.5)).await;
+    assert!(area.refused.is_empty() && area.notes.is_empty(), "{area:?}");
+    assert_eq!((area.step_count, area.value_count), (120, 120));
+    let (a, b) = (area.trend.unwrap(), point.trend.unwrap());
+    assert!((a.theil_sen.slope_per_decade - 0.3).abs() < 1e-2, "{a:?}");
+    // Sums over regions are fixed-point numbers.
+    assert!((a.theil_sen.slope_per_decade - b.theil_sen.slope_per_decade).abs() < 1e-6);
+    let periods: Vec<Period> = manifest.steps.iter().map(|step| step.period).collect();
+    let values: Vec<f64> = (0..120).map(|month| f64::from(rising(month))).collect();
+    let own = analysis::trend::trend(&periods, &values, MeanStep::Month, "m s⁻¹").unwrap();
+    assert_eq!(b, own);
+    let january = &point.climatology.unwrap().rows[0];
+    assert!(
+        (january.mean.unwrap() - (3.0 + 0.03 * 4.5)).abs() < 1e-6,
+        "{january:?}"
+    );
+    assert_eq!(point.anomaly.unwrap().rows.len(), 120);
+    assert!(point.season.unwrap().annual.amplitude > 3.0);
+    assert_eq!(
+        point.extremes.unwrap().highest[0].start.to_string(),
+        "2010-12-01T00:00:00Z"
+    );
+    assert_eq!(point.place.cell.unwrap().row, 5);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn what_is_not_defined_is_said_beside_what_is() {
+    let (_folder, store) = folder_store();
+    let gaps = months(24, |month, cell| {
+        if cell % 4 > 0 || month == 3 {
+            f32::NAN
+        } else {
+            rising(month)
+        }
+    });
+    let manifest = wind(&store, "wind", &gaps).await;
+    let id = manifest.id();
+    let engine = Engine::in_process(store.clone(), parts(2));
+    let parts = vec![AnalysisPart::Trend, AnalysisPart::Season];
+    let options = AnalysisOptions::new(parts).unwrap();
+    let query = region("wind", "-140,-19,-120,-10");
+    let found = analyse(&engine, (&manifest, &id), &query, &options)
+        .await
+        .unwrap();
+    assert_eq!((found.step_count, found.value_count), (24, 23));
+    assert!(found.trend.is_none() && found.season.is_some());
+    assert_eq!(
+        found.refused[0].reason,
+        "a trend needs 5 years of values, and they span 2.0"
+    );
+    assert!(
+        found.notes[0].starts_with("23 of 24 steps hold data over less than half"),
+        "{:?}",
+        found.notes
+    );
+    let nowhere = cell("wind", 0.0, 0.0);
+    let refused = analyse(&engine, (&manifest, &id), &nowhere, &options)
+        .await
+        .unwrap_err();
+    assert_eq!(refused.class(), ErrorClass::BadRequest);
+    let later = query.within("2010".parse().ok(), None);
+    let refused = analyse(&engine, (&manifest, &id), &later, &options)
+        .await
+        .unwrap_err();
+    assert!(refused.to_string().contains("covers 2001"), "{refused}");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_product_that_follows_another_is_found_at_its_lag() {
+    let (_folder, store) = folder_store();
+    // Noise without a season: the second has it two months later.
+    let noise = |month: u32| (month.wrapping_mul(2_654_435_761) >> 20) as f32 / 409.6;
+    let a = wind(&store, "first", &months(60, |month, _| noise(month + 2))).await;
+    let b = wind(&store, "second", &months(66, |month, _| noise(month))).await;
+    let engine = Engine::in_process(store.clone(), parts(2));
+    let query = CorrelationQuery::new(region("first", "global"), product("second"), 4).unwrap();
+    let (a_id, b_id) = (a.id(), b.id());
+    let found = analysis::correlation(&engine, (&a, &a_id), (&b, &b_id), &query)
+        .await
+        .unwrap();
+    assert_eq!((found.rows.len(), found.strongest_lag_steps), (9, Some(2)));
+    assert!((found.rows[6].correlation.unwrap() - 1.0).abs() < 1e-9);
+    assert_eq!(found.end.to_string(), "2006-01-01T00:00:00Z");
+    let native = CorrelationQuery {
+        step: MeanStep::Year,
+        ..query.clone()
+    };
+    let found = analysis::correlation(&engine, (&a, &a_id), (&b, &b_id), &native)
+        .await
+        .unwrap();
+    assert_eq!(found.rows[4].count, 5);
+    let elsewhere = CorrelationQuery {
+        series: query.series.within("2006-02".parse().ok(), None),
+        ..query
+    };
+    let refused = analysis::correlation(&engine, (&b, &b_id), (&a, &a_id), &elsewhere).await;
+    assert_eq!(refused.unwrap_err().class(), ErrorClass::BadRequest);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn periods_versions_and_products_are_compared() {
+    let (_folder, store) = folder_store();
+    // A season, a little noise, and 0.15 more from 2006 on.
+    let value = |month: u32| {
+        let noise = if month.is_multiple_of(2) { 0.02 } else { -0.02 };
+        3.0 + (month % 12) as f32 + noise * ((month / 12) % 3) as f32 + 0.15 * (month / 60) as f32
+    };
+    let first = wind(&store, "wind", &months(120, |month, _| value(month))).await;
+    let second = wind(&store, "wind", &months(120, |month, _| value(month) + 1.0)).await;
+    let ice = land(
+        &store,
+        &product("ice"),
+        Quantity::IceFraction,
+        GRID,
+        &months(12, |_, _| 0.5),
+        12,
+    )
+    .await;
+    let engine = Engine::in_process(store.clone(), parts(2));
+    let all = region("wind", "-140,-19,-120,-10");
+    let [early, late] = ["2001/2005", "2006/2010"].map(|years| all.in_years(years.parse().ok()));
+    let (a, b, c) = (first.id(), second.id(), ice.id());
+    let later = analysis::difference(&engine, ((&first, &a), &late), ((&first, &a), &early));
+    let later = later.await.unwrap();
+    assert!((later.difference.unwrap() - 0.15).abs() < 1e-3, "{later:?}");
+    assert!(later.p_value.unwrap() < 1e-3 && later.of.count == 60);
+    let versions = analysis::difference(&engine, ((&second, &b), &all), ((&first, &a), &all));
+    assert!((versions.await.unwrap().difference.unwrap() - 1.0).abs() < 1e-6);
+    for (minus, reason) in [
+        ((&first, &a), "both sides are the same"),
+        ((&ice, &c), "have no difference"),
+    ] {
+        let other = all.of_product(minus.0.product.clone());
+        let refused = analysis::difference(&engine, ((&first, &a), &all), (minus, &other));
+        let refused = refused.await.unwrap_err();
+        assert_eq!(refused.class(), ErrorClass::BadRequest);
+        assert!(refused.to_string().contains(reason), "{refused}");
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn bands_are_means_by_area_and_time_and_say_what_they_cover() {
+    let (_folder, store) = folder_store();
+    // Row and month; the western half of the second month is missing, and row 4 never has data.
+    let value = |month: u32, cell: usize| {
+        let (row, col) = (cell / 20, cell % 20);
+        if row == 4 || (month == 1 && col < 10) {
+            f32::NAN
+        } else {
+            row as f32 + 100.0 * month as f32
+        }
+    };
+    let manifest = wind(&store, "wind", &months(14, value)).await;
+    let id = manifest.id();
+    let query = HovmollerQuery {
+        product: product("wind"),
+        along: Along::Lat,
+        band_deg: None,
+        bounds_deg: None,
+        step: MeanStep::Month,
+        from: None,
+        to: None,
+        earth: Earth::Wgs84,
+    };
+    let of =
+        async |query: &HovmollerQuery| analysis::hovmoller(&store, (&manifest, &id), query).await;
+    let found = of(&query).await.unwrap();
+    assert_eq!(
+        (found.rows.len(), found.bands.len(), found.band_deg),
+        (14, 9, 1.0)
+    );
+    assert_eq!(
+        (found.bands[0].low_deg, found.bands[8].high_deg),
+        (-19.0, -10.0)
+    );
+    // Bands rise from the south, rows fall from the north.
+    assert!((found.rows[0].means[0].unwrap() - 8.0).abs() < 1e-9);
+    assert!((found.rows[3].means[7].unwrap() - 301.0).abs() < 1e-9);
+    assert_eq!(
+        (found.rows[3].means[4], found.bands[4].area_m2),
+        (None, 0.0)
+    );
+    assert!((found.rows[1].coverage_percent[0] - 50.0).abs() < 1e-9);
+    assert!((found.rows[0].coverage_percent[0] - 100.0).abs() < 1e-9);
+    let years = HovmollerQuery {
+        step: MeanStep::Year,
+        band_deg: Some(9.0),
+        along: Along::Lon,
+        bounds_deg: Some([-140.0, -19.0, -120.0, -18.0]),
+        ..query.clone()
+    };
+    let found = of(&years).await.unwrap();
+    // Each month by its days, February by half of its area: by hand, the eastern band has all of it.
+    let days = [
+        31.0, 28.0, 31.0, 30.0, 31.0, 30.0, 31.0, 31.0, 30.0, 31.0, 30.0, 31.0,
+    ];
+    let east: f64 = (0..12)
+        .map(|m| days[m] * (8.0 + 100.0 * m as f64))
+        .sum::<f64>()
+        / 365.0;
+    let last = found.bands.len() - 1;
+    assert!(
+        (found.rows[0].means[last].unwrap() / east - 1.0).abs() < 1e-9,
+        "{found:?}"
+    );
+    assert_eq!(found.rows.len(), 2);
+    for (wrong, reason) in [
+        (
+            HovmollerQuery {
+                band_deg: Some(0.1),
+                ..query.clone()
+            },
+            "from the size of a cell",
+        ),
+        (
+            HovmollerQuery {
+                band_deg: Some(f64::NAN),
+                ..query.clone()
+            },
+            "from the size of a cell",
+        ),
+        (
+            HovmollerQuery {
+                bounds_deg: Some([0.0, 10.0, 5.0, 20.0]),
+                ..query.clone()
+            },
+            "no cell",
+        ),
+        (
+            HovmollerQuery {
+                bounds_deg: Some([0.0, 20.0, 5.0, 10.0]),
+                ..query.clone()
+            },
+            "west,south",
+        ),
+        (
+            HovmollerQuery {
+                from: "2010".parse().ok(),
+                ..query.clone()
+            },
+            "no step",
+        ),
+    ] {
+        let refused = of(&wrong).await.unwrap_err();
+        assert_eq!(refused.class(), ErrorClass::BadRequest);
+        assert!(refused.to_string().contains(reason), "{refused}");
+    }
+}

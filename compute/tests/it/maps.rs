@@ -1,0 +1,339 @@
+//! Statistics of every cell as products.
+
+use compute::derive::derive_statistic;
+use compute::{ComputeError, Engine, ErrorClass};
+use contract::analysis::{CalendarBins, MapOptions, MapStatistic};
+use contract::grid::Grid;
+use contract::manifest::Manifest;
+use contract::quantity::Quantity;
+use contract::time::Period;
+use storage::{Store, domain, fields};
+
+use crate::fixture::{folder_store, land, parts, product};
+
+/// Blocks that are cut at both edges.
+const GRID: Grid = Grid {
+    rows: 19,
+    cols: 37,
+    north_deg: 40.0,
+    west_deg: -30.0,
+    dlat_deg: 1.0,
+    dlon_deg: 1.0,
+};
+
+/// Three years of months, kg m⁻² s⁻¹ times 10⁹ in two segments: a season that grows with the row, land in column 3, gaps in column 5.
+fn steps() -> Vec<(Period, Vec<f32>)> {
+    let value = |month: u32, cell: usize| {
+        let (row, col) = (cell / 37, cell % 37);
+        match col {
+            3 => f32::NAN,
+            5 if month % 12 == 6 && month > 12 => f32::NAN,
+            6 if month > 0 => f32::NAN,
+            _ => (row as f32) * (month % 12) as f32 + (month / 12) as f32,
+        }
+    };
+    (0..36)
+        .map(|month| {
+            let period = Period::month(2001 + (month / 12) as i32, month % 12 + 1).unwrap();
+            (
+                period,
+                (0..GRID.cell_count())
+                    .map(|cell| value(month, cell))
+                    .collect(),
+            )
+        })
+        .collect()
+}
+
+async fn landed(store: &Store) -> Manifest {
+    land(
+        store,
+        &product("wind"),
+        Quantity::WindSpeed,
+        GRID,
+        &steps(),
+        20,
+    )
+    .await
+}
+
+async fn derived(engine: &Engine, options: &MapOptions) -> Result<Manifest, ComputeError> {
+    derive_statistic(engine, &product("wind"), options, &|_| ()).await
+}
+
+async fn read(store: &Store, manifest: &Manifest, step: usize) -> Vec<f32> {
+    fields::read(store, &manifest.steps[step].field, &GRID)
+        .await
+        .unwrap()
+}
+
+fn at(row: usize, col: usize) -> usize {
+    row * 37 + col
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_climatology_is_a_product_of_twelve_months() {
+    let (_folder, store) = folder_store();
+    let source = landed(&store).await;
+    let engine = Engine::in_process(store.clone(), parts(2));
+    let options = MapOptions::new(MapStatistic::Climatology);
+    let made = derived(&engine, &options).await.unwrap();
+    assert_eq!(
+        (made.product.as_str(), made.steps.len()),
+        ("wind-climatology", 12)
+    );
+    assert_eq!((made.quantity, made.number), (Quantity::WindSpeed, 1));
+    assert_eq!(made.derived_from, Some(source.id()));
+    assert_eq!(
+        made.title,
+        "Test wind, monthly climatology 2001/2003, where 50 % or more hold data"
+    );
+    assert_eq!(made.steps[6].period, Period::month(2002, 7).unwrap());
+    assert_eq!(made.steps[6].origin, "July of 2001/2003");
+    let july = read(&store, &made, 6).await;
+    // By hand: 6 times the row, and 0, 1, 2 of the years.
+    assert_eq!(july[at(4, 0)].to_bits(), 25.0f32.to_bits());
+    // Of three Julys one is there: less than half. Of Januaries only the first.
+    assert!(july[at(4, 5)].is_nan() && july[at(4, 3)].is_nan());
+    assert!(read(&store, &made, 0).await[at(4, 6)].is_nan());
+    let cells = domain::read(&store, &made.domain).await.unwrap();
+    assert!(!cells[at(0, 3)] && !cells[at(0, 6)] && cells[at(0, 5)]);
+    // The same bits in any number of parts, and nothing new of the same.
+    for count in [1, 5] {
+        let engine = Engine::in_process(store.clone(), parts(count));
+        let name = Some(product(&format!("again-{count}")));
+        let again = derived(
+            &engine,
+            &MapOptions {
+                name,
+                ..options.clone()
+            },
+        )
+        .await
+        .unwrap();
+        for month in 0..12 {
+            let (a, b) = (
+                read(&store, &made, month).await,
+                read(&store, &again, month).await,
+            );
+            assert!(a.iter().zip(&b).all(|(a, b)| a.to_bits() == b.to_bits()));
+        }
+        assert_eq!(derived(&engine, &options).await.unwrap(), made);
+    }
+    // One July more, and it is made anew.
+    let mut more = steps();
+    more[30].1[at(4, 0)] += 3.0;
+    land(
+        &store,
+        &product("wind"),
+        Quantity::WindSpeed,
+        GRID,
+        &more,
+        36,
+    )
+    .await;
+    let anew = derived(&engine, &options).await.unwrap();
+    assert_eq!(anew.number, 2);
+    assert_eq!(
+        read(&store, &anew, 6).await[at(4, 0)].to_bits(),
+        26.0f32.to_bits()
+    );
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn anomalies_are_steps_less_their_month() {
+    let (_folder, store) = folder_store();
+    landed(&store).await;
+    let engine = Engine::in_process(store.clone(), parts(2));
+    let options = MapOptions {
+        from: "2003".parse().ok(),
+        base: "2001/2002".parse().ok(),
+        ..MapOptions::new(MapStatistic::Anomaly)
+    };
+    let made = derived(&engine, &options).await.unwrap();
+    assert_eq!(
+        (made.steps.len(), made.steps[0].period),
+        (12, Period::month(2003, 1).unwrap())
+    );
+    for month in 0..12 {
+        let values = read(&store, &made, month).await;
+        assert!(
+            (values[at(7, 9)] - 1.5).abs() < 1e-6,
+            "{}",
+            values[at(7, 9)]
+        );
+    }
+    // A point of it is read like that of any other product.
+    let place = contract::grid::LonLatDeg::new(-20.5, 32.5).unwrap();
+    let point = compute::point_series(&engine, &made.product, place)
+        .await
+        .unwrap();
+    assert_eq!(point.series.len(), 12);
+    assert!((point.series[11].value.unwrap() - 1.5).abs() < 1e-6);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn means_spreads_and_waves_are_those_of_each_cell() {
+    let (_folder, store) = folder_store();
+    landed(&store).await;
+    let engine = Engine::in_process(store.clone(), parts(2));
+    let of = async |statistic| {
+        let made = derived(&engine, &MapOptions::new(statistic)).await.unwrap();
+        assert_eq!(made.steps.len(), 1);
+        (made.steps[0].period, read(&store, &made, 0).await)
+    };
+    let (period, mean) = of(MapStatistic::Mean).await;
+    assert_eq!(
+        period.to_string(),
+        "2001-01-01T00:00:00Z/2004-01-01T00:00:00Z"
+    );
+    let days = [
+        31.0, 28.0, 31.0, 30.0, 31.0, 30.0, 31.0, 31.0, 30.0, 31.0, 30.0, 31.0,
+    ];
+    let months: f64 = (0..12).map(|m| days[m] * m as f64).sum::<f64>() / 365.0;
+    assert!((f64::from(mean[at(4, 0)]) - (4.0 * months + 1.0)).abs() < 1e-5);
+    let (_, spread) = of(MapStatistic::Spread).await;
+    // Row 0 has no season: 0, 1, 2, twelve times each.
+    assert!((f64::from(spread[at(0, 0)]) - (24.0f64 / 35.0).sqrt()).abs() < 1e-6);
+    let (_, wave) = of(MapStatistic::Amplitude).await;
+    // Row 0 has stairs of a year: about a line a saw's teeth, whose first wave has 1 / pi of their height.
+    assert!(
+        (wave[at(0, 0)] - std::f32::consts::FRAC_1_PI).abs() < 0.03,
+        "{}",
+        wave[at(0, 0)]
+    );
+    assert!(wave[at(2, 0)] > 3.0 && (wave[at(4, 0)] / wave[at(2, 0)] - 2.0).abs() < 0.3);
+    let seasons = MapOptions {
+        bins: CalendarBins::Season,
+        ..MapOptions::new(MapStatistic::Climatology)
+    };
+    let made = derived(&engine, &seasons).await.unwrap();
+    assert_eq!(
+        (made.steps.len(), made.steps[0].period.start.to_string()),
+        (4, "2001-12-01T00:00:00Z".to_owned())
+    );
+}
+
+/// Six years of a season that rises by the column's share of a kelvin a year, but for noise of every third month.
+#[tokio::test(flavor = "multi_thread")]
+async fn trends_and_their_chances_are_maps_of_their_own_quantities() {
+    let (_folder, store) = folder_store();
+    let value = |month: u32, cell: usize| {
+        let noise = if month.is_multiple_of(3) { 0.05 } else { 0.0 };
+        let rise = (cell % 37) as f32 / 36.0 * (month as f32 / 12.0);
+        290.0 + (month % 12) as f32 + rise + noise
+    };
+    let steps: Vec<(Period, Vec<f32>)> = (0..72)
+        .map(|month| {
+            let period = Period::month(2001 + (month / 12) as i32, month % 12 + 1).unwrap();
+            let cells = (0..GRID.cell_count()).map(|cell| value(month, cell));
+            (period, cells.collect())
+        })
+        .collect();
+    let sst = Quantity::SeaSurfaceTemperature;
+    land(&store, &product("wind"), sst, GRID, &steps, 30).await;
+    let engine = Engine::in_process(store.clone(), parts(2));
+    let trend = derived(&engine, &MapOptions::new(MapStatistic::Trend))
+        .await
+        .unwrap();
+    assert_eq!(
+        (trend.product.as_str(), trend.quantity.unit()),
+        ("wind-trend", "K year-1")
+    );
+    assert_eq!(trend.quantity.title(), "Sea-surface temperature, trend");
+    let values = read(&store, &trend, 0).await;
+    for col in [0, 18, 36] {
+        // Means of months are taken off, so that a rise within the year is too: five sixths of it are left or more.
+        let share = values[at(3, col)] / (col as f32 / 36.0).max(1e-9);
+        assert!(col == 0 || (0.8..=1.01).contains(&share), "{col}: {share}");
+    }
+    assert!(values[at(3, 0)].abs() < 1e-3);
+    let chance = derived(&engine, &MapOptions::new(MapStatistic::TrendPValue))
+        .await
+        .unwrap();
+    assert_eq!(
+        (chance.product.as_str(), chance.quantity.unit()),
+        ("wind-trend-p-value", "1")
+    );
+    let values = read(&store, &chance, 0).await;
+    assert!(values.iter().all(|p| p.is_nan() || (0.0..=1.0).contains(p)));
+    assert!(values[at(3, 36)] < 0.05, "{}", values[at(3, 36)]);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn what_is_no_statistic_is_refused_with_the_reason() {
+    let (_folder, store) = folder_store();
+    landed(&store).await;
+    let sst = vec![(Period::year(2001).unwrap(), vec![290.0; GRID.cell_count()])];
+    land(
+        &store,
+        &product("sst"),
+        Quantity::SeaSurfaceTemperature,
+        GRID,
+        &sst,
+        1,
+    )
+    .await;
+    let engine = Engine::in_process(store.clone(), parts(1));
+    let of = async |name: &str, options: MapOptions| {
+        let made = derive_statistic(&engine, &product(name), &options, &|_| ()).await;
+        made.unwrap_err()
+    };
+    let new = MapOptions::new;
+    for (name, options, reason) in [
+        (
+            "sst",
+            new(MapStatistic::Climatology),
+            "steps of 365 days have no month",
+        ),
+        ("sst", new(MapStatistic::Mean), "of this name"),
+        ("wind", new(MapStatistic::Trend), "no quantity for a change"),
+        (
+            "wind",
+            MapOptions {
+                base: "1991/2000".parse().ok(),
+                ..new(MapStatistic::Climatology)
+            },
+            "covers 2001",
+        ),
+        (
+            "wind",
+            MapOptions {
+                bins: CalendarBins::Day,
+                ..new(MapStatistic::Climatology)
+            },
+            "months and seasons",
+        ),
+        (
+            "wind",
+            MapOptions {
+                from: "2010".parse().ok(),
+                ..new(MapStatistic::Mean)
+            },
+            "no step",
+        ),
+        (
+            "wind",
+            MapOptions {
+                name: Some(product("wind")),
+                ..new(MapStatistic::Mean)
+            },
+            "name of its own",
+        ),
+    ] {
+        if reason == "of this name" {
+            land(
+                &store,
+                &product("sst-mean"),
+                Quantity::SeaSurfaceTemperature,
+                GRID,
+                &sst,
+                1,
+            )
+            .await;
+        }
+        let refused = of(name, options).await;
+        assert!(refused.to_string().contains(reason), "{refused}");
+        assert_eq!(refused.class(), ErrorClass::BadRequest);
+    }
+}

@@ -1,0 +1,118 @@
+//! Latitude or longitude against time.
+
+use std::fmt::{Display, Formatter};
+use std::str::FromStr;
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use super::{Cited, MeanStep};
+use crate::ContractError;
+use crate::earth::Earth;
+use crate::product::ProductId;
+use crate::time::TimeMs;
+
+/// What bands lie along.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Along {
+    /// Bands of latitude: means over longitude.
+    Lat,
+    /// Bands of longitude: means over latitude.
+    Lon,
+}
+
+impl Along {
+    /// Name on the command line and in addresses.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Lat => "lat",
+            Self::Lon => "lon",
+        }
+    }
+}
+
+impl Display for Along {
+    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.as_str())
+    }
+}
+
+impl FromStr for Along {
+    type Err = ContractError;
+
+    fn from_str(s: &str) -> Result<Self, Self::Err> {
+        match s {
+            "lat" => Ok(Self::Lat),
+            "lon" => Ok(Self::Lon),
+            _ => Err(ContractError::invalid("along", s, "lat or lon")),
+        }
+    }
+}
+
+/// What is asked for.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HovmollerQuery {
+    /// Product.
+    pub product: ProductId,
+    /// What bands lie along.
+    pub along: Along,
+    /// Height or width of a band, degrees; if absent the least of 1, 2, 5, 10 that is no less than a cell.
+    pub band_deg: Option<f64>,
+    /// West, south, east, north of the cells whose middles count; all if absent. East lies above west, up to 360 degrees.
+    pub bounds_deg: Option<[f64; 4]>,
+    /// What a row covers.
+    pub step: MeanStep,
+    /// First instant; the product's first if absent.
+    pub from: Option<TimeMs>,
+    /// First instant after the asked period; the product's end if absent.
+    pub to: Option<TimeMs>,
+    /// Figure of the earth for areas.
+    pub earth: Earth,
+}
+
+/// Means of bands against time.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct Hovmoller {
+    /// What it is to be cited with.
+    #[serde(flatten)]
+    pub cited: Cited,
+    /// What bands lie along.
+    pub along: Along,
+    /// Height or width of a band, degrees.
+    pub band_deg: f64,
+    /// West, south, east, north of the cells whose middles count.
+    pub bounds_deg: [f64; 4],
+    /// What a row covers; of months and years each step counts by the time that lies in it.
+    pub step: MeanStep,
+    /// Figure of the earth for areas.
+    pub earth: Earth,
+    /// Bands from the south or the west.
+    pub bands: Vec<HovmollerBand>,
+    /// One for each step in the order of time.
+    pub rows: Vec<HovmollerRow>,
+}
+
+/// A band: cells whose middles lie in it, its lower edge included.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct HovmollerBand {
+    /// Its southern or western edge, degrees.
+    pub low_deg: f64,
+    /// Its northern or eastern edge, degrees.
+    pub high_deg: f64,
+    /// Area of its cells that hold data in some step, m².
+    pub area_m2: f64,
+}
+
+/// A step.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct HovmollerRow {
+    /// First instant that it covers.
+    pub start: TimeMs,
+    /// First instant after it.
+    pub end: TimeMs,
+    /// Mean of each band over its cells with data, by area; none without any.
+    pub means: Vec<Option<f64>>,
+    /// Share of each band's area that holds data, percent.
+    pub coverage_percent: Vec<f64>,
+}

@@ -1,0 +1,234 @@
+//! Options of what is made of series.
+
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use clap::Args;
+use contract::ContractError;
+use contract::analysis::{
+    Along, AnalysisOptions, AnalysisPart, BasePeriod, CalendarBins, MeanStep,
+};
+use contract::earth::Earth;
+use contract::grid::LonLatDeg;
+use contract::manifest::ManifestId;
+use contract::product::ProductId;
+use contract::time::TimeMs;
+
+/// Heading of what is made of a series.
+const HEADING: &str = "Made of the series";
+
+/// What is made of a series, in place of the series itself; several together.
+#[derive(Debug, Args)]
+pub(crate) struct Analysis {
+    /// Mean, spread and count of each part of the year (--bins) over the years of --base.
+    #[arg(long, help_heading = HEADING)]
+    climatology: bool,
+    /// How far each step is from that climatology: in the unit, and in spreads of its part of the year.
+    #[arg(long, help_heading = HEADING)]
+    anomaly: bool,
+    /// Least-squares and Theil-Sen slopes with intervals of 95 %, and the test of Mann and Kendall; all allow for
+    /// autocorrelation (effective number of values; Hamed and Rao 1998). Needs five years.
+    #[arg(long, help_heading = HEADING)]
+    trend: bool,
+    /// Amplitude and phase of the year and the half-year.
+    #[arg(long, help_heading = HEADING)]
+    season: bool,
+    /// Highest and lowest steps with their dates, and percentiles.
+    #[arg(long, help_heading = HEADING)]
+    extremes: bool,
+    /// Years of the climatology, both part of it: 1991/2020. All that the series covers if absent.
+    #[arg(long, value_name = "FIRST/LAST", help_heading = HEADING)]
+    base: Option<BasePeriod>,
+    /// Parts of the year of the climatology.
+    #[arg(long, default_value_t, value_name = "month|season|day", help_heading = HEADING)]
+    bins: CalendarBins,
+    /// Means that the trend is drawn through; steps as they are where those are longer.
+    #[arg(long, default_value_t, value_name = "month|year|native", help_heading = HEADING)]
+    trend_step: MeanStep,
+    /// Draw it too: the series (with --statistic mean,std also its spread), its climatology, its anomalies or its trend.
+    #[arg(long, value_name = "FILE.svg|FILE.png", help_heading = HEADING)]
+    pub(crate) plot: Option<PlotFile>,
+}
+
+impl Analysis {
+    /// What is asked for; none if the series itself is.
+    pub(crate) fn asked(&self) -> Result<Option<AnalysisOptions>, ContractError> {
+        let asked = [
+            (self.climatology, AnalysisPart::Climatology),
+            (self.anomaly, AnalysisPart::Anomaly),
+            (self.trend, AnalysisPart::Trend),
+            (self.season, AnalysisPart::Season),
+            (self.extremes, AnalysisPart::Extremes),
+        ];
+        let parts: Vec<_> = asked
+            .into_iter()
+            .filter_map(|(is_asked, part)| is_asked.then_some(part))
+            .collect();
+        if parts.is_empty() {
+            return match self.base {
+                Some(base) => {
+                    let reason = "it belongs to --climatology and --anomaly";
+                    Err(ContractError::invalid("--base", &base.to_string(), reason))
+                }
+                None => Ok(None),
+            };
+        }
+        Ok(Some(AnalysisOptions {
+            base: self.base,
+            bins: self.bins,
+            trend_step: self.trend_step,
+            ..AnalysisOptions::new(parts)?
+        }))
+    }
+}
+
+/// Where a series is taken: a region or a cell.
+#[derive(Debug, Args)]
+#[group(required = true, multiple = false)]
+pub(crate) struct Place {
+    /// `global`, a named region, a box WEST,SOUTH,EAST,NORTH, a GeoJSON or WKT file, or the text of one.
+    #[arg(long, allow_hyphen_values = true)]
+    pub(crate) region: Option<String>,
+    /// The cell that holds a place, degrees east and north, in place of a region.
+    #[arg(long, value_name = "LON,LAT", allow_hyphen_values = true)]
+    pub(crate) at: Option<LonLatDeg>,
+}
+
+/// `fluxglobe stats correlate`.
+#[derive(Debug, Args)]
+pub(crate) struct StatsCorrelate {
+    /// The two products, each with its own --product: the first and the second.
+    #[arg(long = "product", required = true, value_name = "PRODUCT")]
+    pub(crate) products: Vec<ProductId>,
+    #[command(flatten)]
+    pub(crate) place: Place,
+    /// Steps that one is moved against the other, at most 400; at lags above zero the first leads.
+    #[arg(long, default_value_t = 0, value_name = "STEPS")]
+    pub(crate) max_lag: u32,
+    /// What they are compared in; `native` needs the same periods of both.
+    #[arg(long, default_value_t, value_name = "month|year|native")]
+    pub(crate) step: MeanStep,
+    /// Take the mean of each calendar month off both first: two series with seasons always go together.
+    #[arg(long)]
+    pub(crate) deseasonalise: bool,
+    /// First instant: 2000, 2000-03, 2000-03-15 or with a time of day. The products' own if absent.
+    #[arg(long)]
+    pub(crate) from: Option<TimeMs>,
+    /// First instant after the period. The products' own if absent.
+    #[arg(long)]
+    pub(crate) to: Option<TimeMs>,
+    /// Figure of the earth for areas: wgs84, sphere (R = 6371 km) or local-radius (as FluxEngine sums).
+    #[arg(long, default_value = "wgs84")]
+    pub(crate) earth: Earth,
+    /// JSON instead of a table.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// `fluxglobe stats difference`.
+#[derive(Debug, Args)]
+pub(crate) struct StatsDifference {
+    /// Product.
+    #[arg(long)]
+    pub(crate) product: ProductId,
+    /// Its years, both part of it: 2001/2005. All that it covers if absent.
+    #[arg(long, value_name = "FIRST/LAST")]
+    pub(crate) period: Option<BasePeriod>,
+    /// Its version, as answers name it. The newest if absent.
+    #[arg(long, value_name = "VERSION")]
+    pub(crate) manifest: Option<ManifestId>,
+    /// Product that is taken off. The same one if absent.
+    #[arg(long, value_name = "PRODUCT")]
+    pub(crate) minus: Option<ProductId>,
+    /// Years that are taken off. The same ones if absent.
+    #[arg(long, value_name = "FIRST/LAST")]
+    pub(crate) minus_period: Option<BasePeriod>,
+    /// Version that is taken off. The newest if absent.
+    #[arg(long, value_name = "VERSION")]
+    pub(crate) minus_manifest: Option<ManifestId>,
+    #[command(flatten)]
+    pub(crate) place: Place,
+    /// Figure of the earth for areas: wgs84, sphere (R = 6371 km) or local-radius (as FluxEngine sums).
+    #[arg(long, default_value = "wgs84")]
+    pub(crate) earth: Earth,
+    /// JSON instead of a table.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// `fluxglobe stats hovmoller`.
+#[derive(Debug, Args)]
+pub(crate) struct StatsHovmoller {
+    /// Product.
+    #[arg(long)]
+    pub(crate) product: ProductId,
+    /// What bands lie along: `lat`, means over longitude, or `lon`, means over latitude.
+    #[arg(long, value_name = "lat|lon")]
+    pub(crate) along: Along,
+    /// Height or width of a band, degrees. The least of 1, 2, 5, 10 that is no less than a cell if absent.
+    #[arg(long, value_name = "DEGREES")]
+    pub(crate) band: Option<f64>,
+    /// What a row covers.
+    #[arg(long, default_value_t, value_name = "month|year|native")]
+    pub(crate) step: MeanStep,
+    /// `global`, a named region that is a box, or WEST,SOUTH,EAST,NORTH: cells whose middles lie in it.
+    #[arg(long, allow_hyphen_values = true)]
+    pub(crate) region: Option<String>,
+    /// First instant: 2000, 2000-03, 2000-03-15 or with a time of day. The product's first if absent.
+    #[arg(long)]
+    pub(crate) from: Option<TimeMs>,
+    /// First instant after the period. The product's end if absent.
+    #[arg(long)]
+    pub(crate) to: Option<TimeMs>,
+    /// Figure of the earth for areas: wgs84, sphere (R = 6371 km) or local-radius (as FluxEngine sums).
+    #[arg(long, default_value = "wgs84")]
+    pub(crate) earth: Earth,
+    /// JSON instead of a table.
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Draw it too.
+    #[arg(long, value_name = "FILE.svg|FILE.png")]
+    pub(crate) plot: Option<PlotFile>,
+}
+
+/// A file of a plot, and what it is written as.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct PlotFile {
+    pub(crate) path: PathBuf,
+    pub(crate) form: PlotForm,
+}
+
+/// What a plot is written as.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum PlotForm {
+    Svg,
+    Png,
+}
+
+impl FromStr for PlotFile {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let path = PathBuf::from(text);
+        let ending = path.extension().map(|ending| ending.to_ascii_lowercase());
+        let form = match ending.as_ref().and_then(|ending| ending.to_str()) {
+            Some("svg") => PlotForm::Svg,
+            Some("png") => PlotForm::Png,
+            _ => return Err("a plot is written to a file that ends in .svg or .png".to_owned()),
+        };
+        Ok(Self { path, form })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn plots_are_told_by_the_ending_of_their_file() {
+        let form = |text: &str| text.parse::<PlotFile>().map(|file| file.form);
+        assert_eq!(form("a/b.svg"), Ok(PlotForm::Svg));
+        assert_eq!(form("B.PNG"), Ok(PlotForm::Png));
+        assert!(form("a.pdf").is_err() && form("svg").is_err());
+    }
+}

@@ -1,0 +1,136 @@
+//! What is made of series on the command line: `fluxglobe stats point|polygon --climatology --anomaly --trend --season
+//! --extremes`, `stats correlate`, `stats difference`, `stats hovmoller`; tables or JSON out, and plots.
+
+mod tables;
+mod together;
+
+use anyhow::{Result, bail};
+use compute::Engine;
+use contract::analysis::{AnalysisOptions, Cited, Hovmoller, HovmollerQuery, SeriesQuery};
+use contract::manifest::Manifest;
+use contract::product::ProductId;
+use contract::region::Region;
+use storage::Store;
+
+use crate::cli::{PlotFile, Settings, StatsHovmoller};
+use crate::{deployment, plot, progress};
+
+pub(crate) use together::{correlate, difference};
+
+/// What is printed and drawn of an analysis.
+pub(crate) struct Output<'a> {
+    pub(crate) json: bool,
+    pub(crate) plot: Option<&'a PlotFile>,
+}
+
+/// Analyses a series of the newest version of a product.
+pub(crate) async fn of_series(
+    settings: &Settings,
+    store: Store,
+    query: &SeriesQuery,
+    options: &AnalysisOptions,
+    output: Output<'_>,
+) -> Result<()> {
+    let manifest = deployment::manifest(&store, query.product(), &settings.data).await?;
+    let bar = progress::bar("analyse the series", 1);
+    let engine = reader(settings, store, query)?;
+    let version = (&manifest, &manifest.id());
+    let answer = compute::analysis::analyse(&engine, version, query, options).await?;
+    bar.finish_and_clear();
+    if let Some(file) = output.plot {
+        plot::write(file, &plot::of_analysis(&answer)?)?;
+    }
+    if output.json {
+        return progress::result(&serde_json::to_string_pretty(&answer)?);
+    }
+    let tables = tables::of_analysis(&answer);
+    if tables.is_empty() {
+        let reasons: Vec<String> = answer
+            .refused
+            .iter()
+            .map(|one| one.reason.clone())
+            .collect();
+        bail!("{}", reasons.join("; "));
+    }
+    progress::result(&tables.join("\n\n"))?;
+    for refused in &answer.refused {
+        progress::say(&format!("no {}: {}", refused.part, refused.reason));
+    }
+    let with_data = format!(
+        "{} of {} steps hold data",
+        answer.value_count, answer.step_count
+    );
+    say_source(&answer.cited, &tables::place(&answer.place), &with_data);
+    for note in &answer.notes {
+        progress::say(&format!("note: {note}"));
+    }
+    Ok(())
+}
+
+/// Latitude or longitude against time.
+pub(crate) async fn hovmoller(settings: &Settings, options: &StatsHovmoller) -> Result<()> {
+    let store = deployment::store(settings)?;
+    let manifest = deployment::manifest(&store, &options.product, &settings.data).await?;
+    let region: Option<Region> = options.region.as_deref().map(str::parse).transpose()?;
+    let query = HovmollerQuery {
+        product: options.product.clone(),
+        along: options.along,
+        band_deg: options.band,
+        bounds_deg: region.map(|region| region.as_box()).transpose()?.flatten(),
+        step: options.step,
+        from: options.from,
+        to: options.to,
+        earth: options.earth,
+    };
+    let bar = progress::bar("means of bands", 1);
+    let version = (&manifest, &manifest.id());
+    let answer: Hovmoller = compute::analysis::hovmoller(&store, version, &query).await?;
+    bar.finish_and_clear();
+    if let Some(file) = &options.plot {
+        plot::write(file, &plot::of_hovmoller(&answer)?)?;
+    }
+    if options.json {
+        return progress::result(&serde_json::to_string_pretty(&answer)?);
+    }
+    progress::result(&tables::of_hovmoller(&answer))?;
+    let bands = format!(
+        "means of {} bands of {} degrees, each cell by its area on the {} earth",
+        answer.bands.len(),
+        answer.band_deg,
+        answer.earth
+    );
+    say_source(&answer.cited, &bands, "a hole is a band without data");
+    Ok(())
+}
+
+/// Who reads a series: one cell from its block in this process, a region where regions are summed.
+fn reader(settings: &Settings, store: Store, query: &SeriesQuery) -> Result<Engine> {
+    match query {
+        SeriesQuery::Cell { .. } => Ok(Engine::local(store)),
+        SeriesQuery::Region(_) => deployment::region_engine(settings, store),
+    }
+}
+
+fn say_source(cited: &Cited, what: &str, more: &str) {
+    let quantity = cited.quantity.title();
+    let unit = if cited.unit.is_empty() { "" } else { " in " };
+    progress::say(&format!(
+        "{quantity}{unit}{}, {what}; {more}; cite {}",
+        cited.unit, cited.manifest
+    ));
+    progress::say(&cited.source);
+}
+
+/// A version by its name, or the newest of a product.
+async fn version(
+    settings: &Settings,
+    store: &Store,
+    product: &ProductId,
+    named: Option<&contract::manifest::ManifestId>,
+) -> Result<Manifest> {
+    match named {
+        None => deployment::manifest(store, product, &settings.data).await,
+        Some(id) if id.product != *product => bail!("version {id} is none of {product}"),
+        Some(id) => Ok(storage::manifests::load(store, id).await?),
+    }
+}

@@ -1,0 +1,137 @@
+//! A chart of values against time: its axes, lines that break at gaps, and bands.
+
+use contract::analysis::{Cited, SeriesAnalysis};
+use contract::time::{Period, TimeMs};
+use plotters::chart::ChartContext;
+use plotters::coord::types::RangedCoordf64;
+use plotters::prelude::{
+    BLACK, Cartesian2d, ChartBuilder, Circle, Color as _, LineSeries, Polygon, RGBColor,
+    SVGBackend, SeriesLabelPosition, WHITE,
+};
+
+use super::marked::Marked;
+use super::page::{Area, COLOURS, Failed, with_unit};
+use super::time_axis::TimeAxis;
+
+/// Steps up to which each is marked by a dot.
+const DOTS_UP_TO: usize = 400;
+
+/// A chart on a part of a page.
+pub(super) type Chart<'a, 'b> =
+    ChartContext<'a, SVGBackend<'b>, Cartesian2d<Marked, RangedCoordf64>>;
+
+/// A value in the middle of a step; none where there is a gap.
+pub(super) type Point = (Period, Option<f64>);
+
+pub(super) fn period(start: TimeMs, end: TimeMs) -> Period {
+    Period { start, end }
+}
+
+/// A region's name, short.
+pub(super) fn named(region: &str) -> String {
+    let is_long = region.chars().count() > 60;
+    let short: String = region.chars().take(60).collect();
+    if is_long {
+        format!("{short}…")
+    } else {
+        short
+    }
+}
+
+/// Where a series is taken, for people.
+pub(super) fn place(answer: &SeriesAnalysis) -> String {
+    match (&answer.place.region, &answer.place.cell) {
+        (Some(region), _) => format!("mean over {}", named(region)),
+        (None, Some(cell)) => format!("cell around {:.4}, {:.4}", cell.lon_deg, cell.lat_deg),
+        (None, None) => String::new(),
+    }
+}
+
+pub(super) fn label(cited: &Cited) -> String {
+    with_unit(cited.quantity.title(), &cited.unit)
+}
+
+pub(super) fn axis_of(points: &[Point]) -> TimeAxis {
+    let (first, last) = (points[0].0, points[points.len() - 1].0);
+    TimeAxis::over(first.start, last.end)
+}
+
+/// A chart with its axes.
+pub(super) fn chart<'a, 'b>(
+    area: &'a Area<'b>,
+    axis: &TimeAxis,
+    values: std::ops::Range<f64>,
+    label: &str,
+) -> Result<Chart<'a, 'b>, Failed> {
+    let mut chart = ChartBuilder::on(area)
+        .margin_left(14)
+        .margin_right(34)
+        .x_label_area_size(34)
+        .y_label_area_size(76)
+        .build_cartesian_2d(Marked::new(axis.range.clone(), axis.marks.clone()), values)?;
+    chart
+        .configure_mesh()
+        .x_label_formatter(&|place| axis.text(place))
+        .y_desc(label)
+        .axis_desc_style(("sans-serif", 15))
+        .label_style(("sans-serif", 13))
+        .light_line_style(BLACK.mix(0.05))
+        .bold_line_style(BLACK.mix(0.12))
+        .draw()?;
+    Ok(chart)
+}
+
+/// A line through the middles of steps, broken where there is a gap; single steps are dots.
+pub(super) fn lines(
+    chart: &mut Chart<'_, '_>,
+    axis: &TimeAxis,
+    points: &[Point],
+    colour: RGBColor,
+) -> Result<(), Failed> {
+    let at = |(period, value): &Point| value.map(|value| (axis.at(period.mid()), value));
+    for run in points.chunk_by(|a, b| a.1.is_some() && b.1.is_some()) {
+        let run: Vec<(f64, f64)> = run.iter().filter_map(at).collect();
+        chart.draw_series(LineSeries::new(run, colour.stroke_width(2)))?;
+    }
+    let is_alone = |i: usize| {
+        let is_gap = |i: Option<usize>| i.and_then(|i| points.get(i)).is_none_or(|p| p.1.is_none());
+        is_gap(i.checked_sub(1)) && is_gap(Some(i + 1))
+    };
+    let all = points.len() <= DOTS_UP_TO;
+    let dots = points.iter().enumerate();
+    let dots = dots
+        .filter(|(i, _)| all || is_alone(*i))
+        .filter_map(|(_, point)| at(point));
+    chart.draw_series(dots.map(|at| Circle::new(at, 2, colour.filled())))?;
+    Ok(())
+}
+
+/// What lies between two lines, broken where either has a gap.
+pub(super) fn band(
+    chart: &mut Chart<'_, '_>,
+    axis: &TimeAxis,
+    low: &[Point],
+    high: &[Point],
+) -> Result<(), Failed> {
+    let at = |(period, value): &Point| value.map(|value| (axis.at(period.mid()), value));
+    let both: Vec<(&Point, &Point)> = low.iter().zip(high).collect();
+    for run in both.chunk_by(|a, b| a.0.1.is_some() && b.0.1.is_some()) {
+        let mut edge: Vec<(f64, f64)> = run.iter().filter_map(|(low, _)| at(low)).collect();
+        edge.extend(run.iter().rev().filter_map(|(_, high)| at(high)));
+        if edge.len() > 2 {
+            chart.draw_series([Polygon::new(edge, COLOURS[0].mix(0.2).filled())])?;
+        }
+    }
+    Ok(())
+}
+
+/// What the lines are, in the upper left corner.
+pub(super) fn legend(chart: &mut Chart<'_, '_>) -> Result<(), Failed> {
+    chart
+        .configure_series_labels()
+        .position(SeriesLabelPosition::UpperLeft)
+        .background_style(WHITE.mix(0.85))
+        .label_font(("sans-serif", 14))
+        .draw()?;
+    Ok(())
+}

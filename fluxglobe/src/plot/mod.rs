@@ -1,0 +1,73 @@
+//! Plots of series and of what is made of them: an answer in, SVG or PNG out. The same answer is always the same bytes.
+
+mod chart;
+mod climatology;
+mod hovmoller;
+mod lines;
+mod marked;
+mod page;
+mod rows;
+mod time_axis;
+mod trend;
+
+use anyhow::{Context as _, Result, bail};
+use contract::analysis::{Hovmoller, SeriesAnalysis};
+use contract::series::{PointSeries, RegionSeries};
+use contract::statistics::StatisticsAnswer;
+
+use crate::cli::{PlotFile, PlotForm};
+
+/// Writes a drawing to a file.
+pub(crate) fn write(file: &PlotFile, svg: &str) -> Result<()> {
+    let bytes = match file.form {
+        PlotForm::Svg => svg.as_bytes().to_vec(),
+        PlotForm::Png => legend::raster::png(svg)?,
+    };
+    let written = std::fs::write(&file.path, bytes);
+    written.with_context(|| format!("the plot cannot be written to {}", file.path.display()))
+}
+
+/// The series of a cell.
+pub(crate) fn of_point(answer: &PointSeries) -> Result<String> {
+    lines::of_point(answer)
+}
+
+/// The means over a region.
+pub(crate) fn of_region(answer: &RegionSeries) -> Result<String> {
+    lines::of_region(answer)
+}
+
+/// Statistics by rows: the mean in a band of its standard deviation, and other ones of its unit.
+pub(crate) fn of_statistics(answer: &StatisticsAnswer) -> Result<String> {
+    rows::of_statistics(answer)
+}
+
+/// The first of climatology, anomalies and trend that there is.
+pub(crate) fn of_analysis(answer: &SeriesAnalysis) -> Result<String> {
+    if let Some(made) = &answer.climatology {
+        return climatology::drawn(answer, made);
+    }
+    if let Some(made) = &answer.anomaly {
+        return lines::of_anomalies(answer, made);
+    }
+    if answer.trend.is_some() {
+        return trend::of_trend(answer);
+    }
+    let reasons: Vec<&str> = answer
+        .refused
+        .iter()
+        .map(|one| one.reason.as_str())
+        .collect();
+    if reasons.is_empty() {
+        bail!("there is a plot of a climatology, of anomalies and of a trend: ask for one of them");
+    }
+    bail!("there is nothing to plot: {}", reasons.join("; "))
+}
+
+/// Latitude or longitude against time.
+pub(crate) fn of_hovmoller(answer: &Hovmoller) -> Result<String> {
+    hovmoller::drawn(answer)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,84 @@
+//! Statistics by rows: the mean in a band of its standard deviation, and other statistics of its unit.
+
+use anyhow::{Result, bail};
+use contract::analysis::Cited;
+use contract::statistics::{Statistic, StatisticsAnswer, StatisticsRow};
+use plotters::prelude::{Color as _, LineSeries, PathElement};
+
+use super::chart::{Point, axis_of, band, chart, label, legend, lines, named, period};
+use super::page::{self, COLOURS, Words, range};
+
+pub(super) fn of_statistics(answer: &StatisticsAnswer) -> Result<String> {
+    let cited = Cited {
+        product: answer.product.clone(),
+        manifest: answer.manifest.clone(),
+        title: answer.title.clone(),
+        source: answer.source.clone(),
+        synthetic: answer.synthetic,
+        quantity: answer.quantity,
+        unit: answer.unit.clone(),
+    };
+    let is_spread = |name: &str| name == Statistic::Std.to_string();
+    let all = answer.statistics.iter();
+    let names: Vec<&str> = all
+        .filter(|one| one.unit == answer.unit && !is_spread(&one.name))
+        .map(|one| one.name.as_str())
+        .take(COLOURS.len())
+        .collect();
+    if names.is_empty() {
+        bail!(
+            "a plot is of statistics in the product's unit: ask for mean, min, max, median or percentiles"
+        );
+    }
+    let of_name = |name: &str| -> Vec<Point> {
+        let value = |row: &StatisticsRow| row.values.get(name).copied().flatten();
+        let rows = answer.rows.iter();
+        rows.map(|row| (period(row.start, row.end), value(row)))
+            .collect()
+    };
+    let (mean, spread) = (
+        of_name(&Statistic::Mean.to_string()),
+        of_name(&Statistic::Std.to_string()),
+    );
+    let ends = |sign: f64| -> Vec<Point> {
+        let both = mean.iter().zip(&spread);
+        both.map(|((period, mean), (_, spread))| {
+            (
+                *period,
+                mean.zip(*spread).map(|(mean, spread)| mean + sign * spread),
+            )
+        })
+        .collect()
+    };
+    let (low, high) = (ends(-1.0), ends(1.0));
+    let has_band = low.iter().any(|(_, value)| value.is_some());
+    let below = format!(
+        "{} of {}, a row a {}{}",
+        names.join(", "),
+        answer.kind,
+        answer.step,
+        if has_band {
+            "; band: mean and one standard deviation on either side"
+        } else {
+            ""
+        }
+    );
+    let words = Words::of(&cited, &named(&answer.geometry), below);
+    let drawn: Vec<(&str, Vec<Point>)> = names.iter().map(|name| (*name, of_name(name))).collect();
+    page::drawn(&words, |area| {
+        let axis = axis_of(&mean);
+        let lines_of = drawn.iter().map(|(_, points)| points).chain([&low, &high]);
+        let values = range(lines_of.flatten().filter_map(|(_, value)| *value));
+        let mut chart = chart(area, &axis, values, &label(&cited))?;
+        band(&mut chart, &axis, &low, &high)?;
+        for ((name, points), colour) in drawn.iter().zip(COLOURS) {
+            lines(&mut chart, &axis, points, colour)?;
+            let nothing = LineSeries::new(std::iter::empty(), colour.stroke_width(2));
+            let drawn = chart.draw_series(nothing)?;
+            drawn.label(*name).legend(move |(x, y)| {
+                PathElement::new(vec![(x, y), (x + 18, y)], colour.stroke_width(2))
+            });
+        }
+        legend(&mut chart)
+    })
+}

@@ -1,0 +1,132 @@
+use serde_json::{Value, json};
+
+use super::*;
+
+fn cited(more: Value) -> Value {
+    let mut cited = json!({"product": "sst", "manifest": "sst@1-00000000", "title": "A <b>& title",
+        "source": "made by a test", "synthetic": true, "quantity": "sea_surface_temperature", "unit": "°C"});
+    let Value::Object(more) = more else {
+        unreachable!("an object is given")
+    };
+    cited.as_object_mut().unwrap().extend(more);
+    cited
+}
+
+fn month(index: u32) -> (String, String) {
+    let period = contract::time::Period::month(2001 + (index / 12) as i32, index % 12 + 1).unwrap();
+    (period.start.to_string(), period.end.to_string())
+}
+
+fn analysis(part: &str, made: Value) -> SeriesAnalysis {
+    let mut all = cited(json!({"region": "global", "start": "2001-01-01T00:00:00Z",
+        "end": "2011-01-01T00:00:00Z", "step_count": 120, "value_count": 120, "notes": [], "refused": []}));
+    all[part] = made;
+    serde_json::from_value(all).unwrap()
+}
+
+fn is_told(svg: &str) {
+    for text in [
+        "Sea-surface temperature",
+        "(synthetic)",
+        "°C",
+        "sst@1-00000000",
+        "made by a test",
+    ] {
+        assert!(svg.contains(text), "{text}");
+    }
+    assert!(!svg.contains("<b>"), "a title is text, not markup");
+    let png = legend::raster::png(svg).unwrap();
+    assert!(png.len() > 5_000, "a picture of nothing");
+}
+
+#[test]
+fn a_climatology_is_a_line_of_means_in_a_band_of_spreads() {
+    let row = |bin: u32| {
+        let spread = (bin != 4).then_some(1.0);
+        json!({"bin": "m", "mean": (bin != 7).then(|| f64::from(bin)), "spread": spread, "count": 3, "years": 3})
+    };
+    let rows: Vec<Value> = (0..12).map(row).collect();
+    let made = json!({"bins": "month", "base": "2001/2010", "rows": rows});
+    let svg = of_analysis(&analysis("climatology", made)).unwrap();
+    is_told(&svg);
+    assert!(svg.contains("2001/2010") && svg.contains("Jan") && svg.contains("Dec"));
+    // One month has no data: two bands, and eleven dots.
+    assert_eq!(
+        (
+            svg.matches("<polygon").count(),
+            svg.matches("<circle").count()
+        ),
+        (2, 11)
+    );
+}
+
+#[test]
+fn a_trend_is_its_values_two_lines_and_their_bands() {
+    let value = |index: u32| {
+        let (start, end) = month(index);
+        json!({"start": start, "end": end, "value": f64::from(index) / 100.0})
+    };
+    let values: Vec<Value> = (0..120).map(value).collect();
+    let made = json!({"slope_unit": "°C per decade", "step": "month", "deseasonalised": true, "count": 120,
+        "years": 10.0, "mid": "2006-01-01T00:00:00Z", "mean": 0.6,
+        "least_squares": {"slope_per_decade": 1.2, "standard_error_per_decade": 0.1, "lower_per_decade": 1.0,
+            "upper_per_decade": 1.4, "p_value": 1e-9, "lag1_autocorrelation": 0.1, "effective_count": 100.0},
+        "theil_sen": {"slope_per_decade": 1.2, "lower_per_decade": 1.1, "upper_per_decade": 1.3, "at_mid": 0.6},
+        "mann_kendall": {"score": 7000, "tau": 0.99, "variance_correction": 1.0, "z": 9.0, "p_value": 0.02},
+        "values": values});
+    let svg = of_analysis(&analysis("trend", made)).unwrap();
+    is_told(&svg);
+    for text in [
+        "Theil-Sen +1.2000 °C per decade, p = 0.0200",
+        "p &lt; 0.0001",
+        "95 %",
+        "2010",
+    ] {
+        assert!(svg.contains(text), "{text}: {svg}");
+    }
+    assert_eq!(svg.matches("<polygon").count(), 2);
+}
+
+#[test]
+fn anomalies_are_bars_of_two_colours() {
+    let row = |index: u32| {
+        let (start, end) = month(index);
+        let anomaly = (index != 3).then(|| f64::from(index) - 5.0);
+        json!({"start": start, "end": end, "mid": start, "value": anomaly, "normal": 0.0, "anomaly": anomaly,
+            "standardised": null})
+    };
+    let rows: Vec<Value> = (0..12).map(row).collect();
+    let made = json!({"bins": "month", "base": "2001/2010", "rows": rows});
+    let svg = of_analysis(&analysis("anomaly", made)).unwrap();
+    is_told(&svg);
+    let bars = |colour: &str| svg.matches(&format!("fill=\"{colour}\"")).count();
+    assert_eq!((bars("#0072B2"), bars("#D55E00")), (4, 7));
+}
+
+#[test]
+fn bands_against_time_have_the_colours_of_the_quantity_and_a_bar_of_them() {
+    let row = |index: u32| {
+        let (start, end) = month(index);
+        let means = json!([f64::from(index), 20.0, null]);
+        json!({"start": start, "end": end, "means": means, "coverage_percent": [100.0, 100.0, 0.0]})
+    };
+    let rows: Vec<Value> = (0..24).map(row).collect();
+    let band = |low: f64| json!({"low_deg": low, "high_deg": low + 30.0, "area_m2": 1e12});
+    let made = json!({"along": "lat", "band_deg": 30.0, "bounds_deg": [-180.0, -30.0, 180.0, 60.0],
+        "step": "month", "earth": "wgs84", "bands": [band(-30.0), band(0.0), band(30.0)], "rows": rows});
+    let svg = of_hovmoller(&serde_json::from_value(cited(made)).unwrap()).unwrap();
+    is_told(&svg);
+    assert!(svg.contains("degrees north") && svg.contains("2002-01"));
+    assert_eq!(svg.matches("fill=\"#D6D6D6\"").count(), 24);
+}
+
+#[test]
+fn what_has_no_plot_says_so() {
+    let made = json!({"highest": [], "lowest": [], "percentiles": []});
+    let refused = of_analysis(&analysis("extremes", made)).unwrap_err();
+    assert!(
+        refused
+            .to_string()
+            .contains("a climatology, of anomalies and of a trend")
+    );
+}

@@ -1,0 +1,165 @@
+//! `/api/products/{product}/analysis`: climatology, anomaly, trend, season and extremes of a cell's or a region's series.
+
+use axum::Json;
+use axum::extract::State;
+use axum::http::header;
+use axum::response::{IntoResponse as _, Response};
+use contract::analysis::{AnalysisOptions, AnalysisPart, SeriesAnalysis, SeriesQuery};
+use contract::grid::LonLatDeg;
+use contract::series::RegionSeriesQuery;
+use serde::Deserialize;
+use utoipa::IntoParams;
+
+use crate::backend::{SeriesQuestion, Version};
+use crate::catalogue::Layer;
+use crate::error::ServerError;
+use crate::extract::{UrlPath, UrlQuery, number, parsed, time};
+use crate::routes::budget::ocean;
+use crate::state::AppState;
+
+#[derive(Debug, Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct AnalysisParameters {
+    /// What is made of the series: `climatology`, `anomaly`, `trend`, `season`, `extremes`, several with commas.
+    #[param(value_type = String)]
+    parts: Option<String>,
+    /// Years of the climatology, both part of it: `1991/2020`; all that are covered unless given.
+    base: Option<String>,
+    /// Parts of the year of the climatology: `month` (the default), `season` or `day`.
+    bins: Option<String>,
+    /// Means that the trend is drawn through: `month` (the default), `year` or `native`.
+    trend_step: Option<String>,
+    /// Longitude of a cell, degrees east, -180 to 360; with `lat`, in place of a region.
+    #[param(value_type = Option<f64>)]
+    lon: Option<String>,
+    /// Latitude of a cell, degrees north.
+    #[param(value_type = Option<f64>, minimum = -90, maximum = 90)]
+    lat: Option<String>,
+    /// `global`, a name that `/api/regions` lists, `west,south,east,north` in degrees, GeoJSON or well-known text.
+    region: Option<String>,
+    /// First instant, ISO 8601 UTC; the product's own unless one is given.
+    from: Option<String>,
+    /// First instant after the period; the product's own unless one is given.
+    to: Option<String>,
+    /// Figure of the earth for areas; `wgs84` unless one is given.
+    #[param(value_type = Option<contract::earth::Earth>)]
+    earth: Option<String>,
+    /// Landed product whose cells say how much of them is sea or land, in place of Natural Earth.
+    ocean: Option<String>,
+    /// Version, as answers name it; the newest unless one is given.
+    manifest: Option<String>,
+}
+
+/// Climatology, anomaly, trend, season and extremes of a series. What is not defined for it stands in `refused` with the reason.
+#[utoipa::path(
+    get,
+    path = "/api/products/{product}/analysis",
+    operation_id = "analysis",
+    tag = "statistics",
+    params(("product" = String, Path, description = "Name of the product"), AnalysisParameters),
+    responses((status = 200, description = "What was asked for, each part by itself", body = SeriesAnalysis)),
+)]
+pub(crate) async fn get(
+    State(state): State<AppState>,
+    UrlPath(product): UrlPath<String>,
+    UrlQuery(asked): UrlQuery<AnalysisParameters>,
+) -> Result<Response, ServerError> {
+    let layer = state
+        .catalogue
+        .version(&product, asked.manifest.as_deref())
+        .await?;
+    let parts = asked.parts.as_deref().unwrap_or_default().split(',');
+    let parts = parts
+        .filter(|part| !part.is_empty())
+        .map(str::parse::<AnalysisPart>);
+    let options = AnalysisOptions {
+        base: parsed(asked.base.as_deref())?,
+        bins: parsed(asked.bins.as_deref())?.unwrap_or_default(),
+        trend_step: parsed(asked.trend_step.as_deref())?.unwrap_or_default(),
+        ..AnalysisOptions::new(parts.collect::<Result<_, _>>()?)?
+    };
+    let asked = AskedSeries {
+        place: [asked.lon.as_deref(), asked.lat.as_deref()],
+        region: asked.region.as_deref(),
+        period: [asked.from.as_deref(), asked.to.as_deref()],
+        earth: asked.earth.as_deref(),
+        ocean: asked.ocean.as_deref(),
+    };
+    let series = asked.query(&state, &layer).await?;
+    let of = version(&layer);
+    answer(
+        &state,
+        SeriesQuestion::Analysis {
+            of,
+            series,
+            options,
+        },
+    )
+    .await
+}
+
+/// A cell or a region, and a period, as an address has them.
+pub(crate) struct AskedSeries<'a> {
+    /// Longitude and latitude.
+    pub(crate) place: [Option<&'a str>; 2],
+    pub(crate) region: Option<&'a str>,
+    /// First instant, and the first one after it.
+    pub(crate) period: [Option<&'a str>; 2],
+    pub(crate) earth: Option<&'a str>,
+    pub(crate) ocean: Option<&'a str>,
+}
+
+impl AskedSeries<'_> {
+    /// The question, if it can be asked of a version.
+    pub(crate) async fn query(
+        &self,
+        state: &AppState,
+        layer: &Layer,
+    ) -> Result<SeriesQuery, ServerError> {
+        let product = layer.manifest.product.clone();
+        let [from, to] = [time(self.period[0])?, time(self.period[1])?];
+        // What cannot be asked waits for no turn.
+        layer.manifest.steps_inside(from, to)?;
+        match (self.region, self.place) {
+            (None, [Some(lon), Some(lat)]) => {
+                let lon = number("lon", lon, "degrees east")?;
+                let lat = number("lat", lat, "degrees north, -90 to 90")?;
+                let place = LonLatDeg::new(lon, lat)?;
+                layer.manifest.cell_inside(place)?;
+                Ok(SeriesQuery::Cell {
+                    product,
+                    place,
+                    from,
+                    to,
+                })
+            }
+            (Some(region), [None, None]) => Ok(SeriesQuery::Region(RegionSeriesQuery {
+                from,
+                to,
+                earth: parsed(self.earth)?.unwrap_or_default(),
+                ocean: ocean(state, self.ocean).await?,
+                ..RegionSeriesQuery::new(product, region.parse()?)
+            })),
+            _ => Err(ServerError::Missing {
+                name: "region",
+                wanted: "a region, or lon and lat of a cell, and not both",
+            }),
+        }
+    }
+}
+
+pub(crate) fn version(layer: &Layer) -> Version {
+    Version {
+        manifest: layer.manifest.clone(),
+        id: layer.id.clone(),
+    }
+}
+
+pub(crate) async fn answer(
+    state: &AppState,
+    question: SeriesQuestion,
+) -> Result<Response, ServerError> {
+    let made = state.analyses.made_of_series(question).await?;
+    Ok(([(header::CACHE_CONTROL, "no-cache")], Json(&*made)).into_response())
+}

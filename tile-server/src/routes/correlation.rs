@@ -1,0 +1,104 @@
+//! `/api/products/{product}/correlation`: how the series of two products go together, now and later.
+
+use axum::extract::State;
+use axum::response::Response;
+use contract::analysis::{Correlation, CorrelationQuery};
+use serde::Deserialize;
+use utoipa::IntoParams;
+
+use crate::backend::SeriesQuestion;
+use crate::error::ServerError;
+use crate::extract::{UrlPath, UrlQuery, parsed, whole_number};
+use crate::routes::analysis::{AskedSeries, answer, version};
+use crate::state::AppState;
+
+#[derive(Debug, Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct CorrelationParameters {
+    /// The second product.
+    #[param(value_type = String)]
+    with: Option<String>,
+    /// Most steps that one is moved against the other, 0 (the default) to 400.
+    #[param(value_type = Option<u32>, maximum = 400)]
+    max_lag: Option<String>,
+    /// What they are compared in: `month` (the default), `year` or `native`, for which both need the same periods.
+    step: Option<String>,
+    /// `true`: the mean of each calendar month is taken off both first.
+    #[param(value_type = Option<bool>)]
+    deseasonalise: Option<String>,
+    /// Longitude of a cell, degrees east, -180 to 360; with `lat`, in place of a region.
+    #[param(value_type = Option<f64>)]
+    lon: Option<String>,
+    /// Latitude of a cell, degrees north.
+    #[param(value_type = Option<f64>, minimum = -90, maximum = 90)]
+    lat: Option<String>,
+    /// `global`, a name that `/api/regions` lists, `west,south,east,north` in degrees, GeoJSON or well-known text.
+    region: Option<String>,
+    /// First instant, ISO 8601 UTC; the products' own unless one is given.
+    from: Option<String>,
+    /// First instant after the period; the products' own unless one is given.
+    to: Option<String>,
+    /// Figure of the earth for areas; `wgs84` unless one is given.
+    #[param(value_type = Option<contract::earth::Earth>)]
+    earth: Option<String>,
+    /// Version, as answers name it; the newest unless one is given.
+    manifest: Option<String>,
+    /// Version of the second product; the newest unless one is given.
+    with_manifest: Option<String>,
+}
+
+/// The correlation of two products over a region or at a place, at every lag.
+#[utoipa::path(
+    get,
+    path = "/api/products/{product}/correlation",
+    operation_id = "correlation",
+    tag = "statistics",
+    params(("product" = String, Path, description = "Name of the first product"), CorrelationParameters),
+    responses((status = 200, description = "One row for each lag", body = Correlation)),
+)]
+pub(crate) async fn get(
+    State(state): State<AppState>,
+    UrlPath(product): UrlPath<String>,
+    UrlQuery(asked): UrlQuery<CorrelationParameters>,
+) -> Result<Response, ServerError> {
+    let of = state
+        .catalogue
+        .version(&product, asked.manifest.as_deref())
+        .await?;
+    let Some(with) = asked.with.as_deref() else {
+        let (name, wanted) = ("with", "the name of a second product");
+        return Err(ServerError::Missing { name, wanted });
+    };
+    let with = state
+        .catalogue
+        .version(with, asked.with_manifest.as_deref())
+        .await?;
+    let max_lag = asked.max_lag.as_deref().unwrap_or("0");
+    let series = AskedSeries {
+        place: [asked.lon.as_deref(), asked.lat.as_deref()],
+        region: asked.region.as_deref(),
+        period: [asked.from.as_deref(), asked.to.as_deref()],
+        earth: asked.earth.as_deref(),
+        ocean: None,
+    };
+    let series = series.query(&state, &of).await?;
+    let max_lag = whole_number("max_lag", max_lag, "a whole number, 0 to 400")?;
+    let query = CorrelationQuery {
+        step: parsed(asked.step.as_deref())?.unwrap_or_default(),
+        deseasonalise: match asked.deseasonalise.as_deref() {
+            None | Some("false") => false,
+            Some("true") => true,
+            Some(other) => {
+                return Err(ServerError::invalid(
+                    "deseasonalise",
+                    other,
+                    "true or false",
+                ));
+            }
+        },
+        ..CorrelationQuery::new(series, with.manifest.product.clone(), max_lag)?
+    };
+    let (of, with) = (version(&of), version(&with));
+    answer(&state, SeriesQuestion::Correlation { of, with, query }).await
+}

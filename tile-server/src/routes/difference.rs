@@ -1,0 +1,84 @@
+//! `/api/products/{product}/difference`: the mean of two periods, versions or products, one less the other.
+
+use axum::extract::State;
+use axum::response::Response;
+use contract::analysis::{BasePeriod, Difference};
+use serde::Deserialize;
+use utoipa::IntoParams;
+
+use crate::backend::SeriesQuestion;
+use crate::error::ServerError;
+use crate::extract::{UrlPath, UrlQuery, parsed};
+use crate::routes::analysis::{AskedSeries, answer, version};
+use crate::state::AppState;
+
+#[derive(Debug, Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct DifferenceParameters {
+    /// Years, both part of it: `2001/2005`; all that are covered unless given.
+    period: Option<String>,
+    /// Version, as answers name it; the newest unless one is given.
+    manifest: Option<String>,
+    /// Product that is taken off; the same one unless given.
+    minus: Option<String>,
+    /// Its years; the same ones unless given.
+    minus_period: Option<String>,
+    /// Its version; the newest unless one is given.
+    minus_manifest: Option<String>,
+    /// Longitude of a cell, degrees east, -180 to 360; with `lat`, in place of a region.
+    #[param(value_type = Option<f64>)]
+    lon: Option<String>,
+    /// Latitude of a cell, degrees north.
+    #[param(value_type = Option<f64>, minimum = -90, maximum = 90)]
+    lat: Option<String>,
+    /// `global`, a name that `/api/regions` lists, `west,south,east,north` in degrees, GeoJSON or well-known text.
+    region: Option<String>,
+    /// Figure of the earth for areas; `wgs84` unless one is given.
+    #[param(value_type = Option<contract::earth::Earth>)]
+    earth: Option<String>,
+}
+
+/// The mean over time of one product, version or period less that of another, with its standard error.
+#[utoipa::path(
+    get,
+    path = "/api/products/{product}/difference",
+    operation_id = "difference",
+    tag = "statistics",
+    params(("product" = String, Path, description = "Name of the product"), DifferenceParameters),
+    responses((status = 200, description = "Both means and their difference", body = Difference)),
+)]
+pub(crate) async fn get(
+    State(state): State<AppState>,
+    UrlPath(product): UrlPath<String>,
+    UrlQuery(asked): UrlQuery<DifferenceParameters>,
+) -> Result<Response, ServerError> {
+    let of = state
+        .catalogue
+        .version(&product, asked.manifest.as_deref())
+        .await?;
+    let other = asked.minus.as_deref().unwrap_or(&product);
+    let minus = state
+        .catalogue
+        .version(other, asked.minus_manifest.as_deref())
+        .await?;
+    let series = AskedSeries {
+        place: [asked.lon.as_deref(), asked.lat.as_deref()],
+        region: asked.region.as_deref(),
+        period: [None, None],
+        earth: asked.earth.as_deref(),
+        ocean: None,
+    };
+    let series = series.query(&state, &of).await?;
+    let period: Option<BasePeriod> = parsed(asked.period.as_deref())?;
+    let minus_period = parsed(asked.minus_period.as_deref())?.or(period);
+    let series = series.in_years(period);
+    let other = series
+        .of_product(minus.manifest.product.clone())
+        .in_years(minus_period);
+    let question = SeriesQuestion::Difference {
+        of: (version(&of), series),
+        minus: (version(&minus), other),
+    };
+    answer(&state, question).await
+}
