@@ -212,6 +212,7 @@ impl TestApp {
             domain: domain::write(&self.store, &product, &known).await.unwrap(),
             series: vec![],
             derived_from,
+            computed: None,
             notices: vec![],
             product,
         };
