@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{Manifest, ManifestId, Step};
 use crate::ContractError;
+use crate::computed::Computed;
 use crate::digest::Digest;
 use crate::grid::Grid;
 use crate::key::ObjectKey;
@@ -64,6 +65,9 @@ pub struct PagedManifest {
     pub domain: ObjectKey,
     /// The manifest this one was derived from, if it was computed rather than ingested.
     pub derived_from: Option<ManifestId>,
+    /// How, if it was by an expression or by regridding.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub computed: Option<Computed>,
 }
 
 impl PagedManifest {
@@ -127,6 +131,7 @@ impl PagedManifest {
             domain: self.domain,
             series: vec![],
             derived_from: self.derived_from,
+            computed: self.computed,
         })
     }
 }
@@ -164,6 +169,7 @@ impl Manifest {
             rest,
             domain: self.domain.clone(),
             derived_from: self.derived_from.clone(),
+            computed: self.computed.clone(),
         };
         Some((paged, pages))
     }

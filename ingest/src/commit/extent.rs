@@ -178,6 +178,7 @@ mod tests {
             domain,
             series: vec![],
             derived_from: None,
+            computed: None,
             notices: vec![],
             product: product.clone(),
         };

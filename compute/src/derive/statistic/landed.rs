@@ -195,6 +195,7 @@ pub(super) async fn manifest(
         domain: domain::write(store, target, &found.cells).await?,
         series,
         derived_from: Some(source.id()),
+        computed: None,
         notices: vec![],
     })
 }
