@@ -16,23 +16,23 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 use contract::computed::{Computation, Computed, ComputedInput};
 use contract::digest::Digest;
-use contract::manifest::{MANIFEST_SCHEMA, Manifest, SeriesSegment, Step};
+use contract::manifest::{MANIFEST_SCHEMA, Manifest, Step};
 use contract::masked::MaskedCells;
 use contract::product::ProductId;
 use storage::{StorageError, domain, manifests};
 
 use crate::expression::unit::Unit;
-use crate::functions::{COMPUTED_FIELD, COMPUTED_SERIES};
+use crate::functions::{COMPUTED_EXTENT, COMPUTED_FIELD};
 use crate::{ComputeError, DeriveProgress, Engine, catalogue};
-use job::{FieldMade, FieldTask, Job, SeriesMade, SeriesTask};
+use job::{ExtentMade, ExtentTask, FieldMade, FieldTask, Job};
 use make::Maker;
 use matched::{Input, Matched, Matches};
 pub use request::{Request, RequestedInput};
 
 /// Version of the way products are computed: it changes when their bits do.
 const METHOD: u32 = 1;
-/// Values of one series segment: 256 MiB of f32, whatever the grid.
-const SEGMENT_VALUES: usize = 64 << 20;
+/// Values that a task looks through for the cells that hold data: 256 MiB of f32, whatever the grid.
+const RUN_VALUES: usize = 64 << 20;
 /// Steps that are asked of the engine at a time, so that progress is told.
 const STEPS_AT_A_TIME: usize = 1024;
 /// How often the commit is tried again when another writer takes the number.
@@ -78,8 +78,8 @@ pub async fn compute(
     }
     let (kept_count, left_out) = (kept.len(), plan.matches.left_out);
     let (steps, outside) = plan.fields(engine, kept, progress).await?;
-    let (series, domain) = plan.series(engine, &steps).await?;
-    let manifest = plan.manifest(request, steps, series, domain);
+    let domain = plan.extent(engine, &steps).await?;
+    let manifest = plan.manifest(request, steps, domain);
     Ok(Outcome {
         manifest: commit(engine, manifest).await?,
         kept_count,
@@ -250,47 +250,39 @@ impl Plan {
         }
     }
 
-    /// Series of all steps, and the cells that hold data in some of them.
-    async fn series(
+    /// The cells that hold data in some of the steps.
+    async fn extent(
         &self,
         engine: &Engine,
         steps: &[Step],
-    ) -> Result<(Vec<SeriesSegment>, contract::key::ObjectKey), ComputeError> {
-        let per_segment = (SEGMENT_VALUES / self.job.target_grid.cell_count()).max(1);
-        let task = |(index, run): (usize, &[Step])| SeriesTask {
-            first: index * per_segment,
+    ) -> Result<contract::key::ObjectKey, ComputeError> {
+        let per_run = (RUN_VALUES / self.job.target_grid.cell_count()).max(1);
+        let task = |(index, run): (usize, &[Step])| ExtentTask {
+            first: index * per_run,
             fields: run.iter().map(|step| step.field.clone()).collect(),
         };
-        let runs = steps.chunks(per_segment).enumerate();
-        let tasks: Vec<SeriesTask> = runs.map(task).collect();
-        let mut made: Vec<SeriesMade> =
-            work::on_engine(engine, COMPUTED_SERIES, &self.job, &tasks).await?;
+        let runs = steps.chunks(per_run).enumerate();
+        let tasks: Vec<ExtentTask> = runs.map(task).collect();
+        let mut made: Vec<ExtentMade> =
+            work::on_engine(engine, COMPUTED_EXTENT, &self.job, &tasks).await?;
         made.sort_by_key(|made| made.first);
         let mut cells = vec![false; self.job.target_grid.cell_count()];
-        let mut segments = vec![];
         for (made, task) in made.iter().zip(&tasks) {
             if made.first != task.first {
                 return Err(not_asked());
             }
-            segments.push(SeriesSegment {
-                first_step: made.first as u32,
-                steps: task.fields.len() as u32,
-                series: made.series.clone(),
-            });
             let of_run = domain::read(engine.store(), &made.domain).await?;
             for (cell, held) in cells.iter_mut().zip(of_run) {
                 *cell |= held;
             }
         }
-        let domain = domain::write(engine.store(), &self.job.target, &cells).await?;
-        Ok((segments, domain))
+        Ok(domain::write(engine.store(), &self.job.target, &cells).await?)
     }
 
     fn manifest(
         self,
         request: &Request,
         steps: Vec<Step>,
-        series: Vec<SeriesSegment>,
         domain: contract::key::ObjectKey,
     ) -> Manifest {
         let computed = self.computed(request);
@@ -305,7 +297,7 @@ impl Plan {
             grid: self.job.target_grid,
             steps,
             domain,
-            series,
+            series: vec![],
             derived_from: computed.inputs.first().map(|input| input.manifest.clone()),
             computed: Some(computed),
             notices: vec![],

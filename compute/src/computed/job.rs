@@ -43,17 +43,16 @@ pub(crate) struct FieldMade {
     pub(crate) outside: BTreeMap<String, u64>,
 }
 
-/// A run of stored steps to store time-major.
+/// A run of stored steps, to find which cells hold data.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(crate) struct SeriesTask {
+pub(crate) struct ExtentTask {
     pub(crate) first: usize,
     pub(crate) fields: Vec<ObjectKey>,
 }
 
-/// A run that is stored, and the cells that hold data in some step of it.
+/// The cells that hold data in some step of a run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(crate) struct SeriesMade {
+pub(crate) struct ExtentMade {
     pub(crate) first: usize,
-    pub(crate) series: ObjectKey,
     pub(crate) domain: ObjectKey,
 }

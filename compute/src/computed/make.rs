@@ -1,10 +1,9 @@
-//! The work itself, on whichever machine: fields of the inputs in, a field of the result stored; fields in, a series stored.
+//! The work itself, on whichever machine: fields of the inputs in, a field of the result stored; fields in, the cells with data stored.
 
 use contract::computed::Computation;
-use contract::key::ObjectKey;
-use storage::{Store, domain, fields, series};
+use storage::{Store, domain, fields};
 
-use super::job::{FieldMade, FieldTask, Job, SeriesMade, SeriesTask};
+use super::job::{ExtentMade, ExtentTask, FieldMade, FieldTask, Job};
 use crate::ComputeError;
 use crate::expression::unit::Unit;
 use crate::expression::{Evaluated, Expression};
@@ -115,26 +114,22 @@ pub(crate) async fn field(
     })
 }
 
-/// Stores a run of steps time-major.
+/// Finds and stores which cells hold data in a run of steps.
 pub(crate) async fn run(
     store: &Store,
     job: &Job,
-    task: &SeriesTask,
-) -> Result<SeriesMade, ComputeError> {
+    task: &ExtentTask,
+) -> Result<ExtentMade, ComputeError> {
     let grid = &job.target_grid;
-    let (mut steps, mut cells) = (vec![], vec![false; grid.cell_count()]);
+    let mut cells = vec![false; grid.cell_count()];
     for key in &task.fields {
         let values = fields::read(store, key, grid).await?;
         for (cell, value) in cells.iter_mut().zip(&values) {
             *cell |= !value.is_nan();
         }
-        steps.push(values);
     }
-    let views: Vec<&[f32]> = steps.iter().map(Vec::as_slice).collect();
-    let series: ObjectKey = series::write(store, &job.target, grid, &views).await?;
-    Ok(SeriesMade {
+    Ok(ExtentMade {
         first: task.first,
-        series,
         domain: domain::write(store, &job.target, &cells).await?,
     })
 }

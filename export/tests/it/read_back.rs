@@ -111,7 +111,7 @@ fn read_back(format: Format, name: &str, quantity: Quantity) {
     let wrong: [fn(&mut Value); 3] = [
         |told| {
             told["steps"][1]["bits"][700] =
-                json!(told["steps"][1]["bits"][700].as_u64().unwrap() ^ 1)
+                json!(told["steps"][1]["bits"][700].as_u64().unwrap() ^ 1);
         },
         |told| told["lat"][3] = json!(told["lat"][3].as_f64().unwrap() + 1e-9),
         |told| {

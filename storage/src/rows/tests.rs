@@ -18,7 +18,11 @@ fn period() -> Period {
 }
 
 fn value(cell: usize) -> f32 {
-    if cell % 7 == 0 { f32::NAN } else { cell as f32 }
+    if cell.is_multiple_of(7) {
+        f32::NAN
+    } else {
+        cell as f32
+    }
 }
 
 /// A store with a field of a grid.

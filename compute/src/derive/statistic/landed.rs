@@ -1,13 +1,13 @@
-//! Statistics landed: every block of cells computed, fields, series and domain stored.
+//! Statistics landed: every block of cells computed, fields and domain stored.
 
 use std::sync::Arc;
 
 use contract::ContractError;
 use contract::analysis::MapStatistic;
-use contract::manifest::{MANIFEST_SCHEMA, Manifest, SeriesSegment, Step};
+use contract::manifest::{MANIFEST_SCHEMA, Manifest, Step};
 use contract::product::ProductId;
 use rayon::prelude::*;
-use storage::{Store, domain, fields, series};
+use storage::{Store, domain, fields};
 
 use super::super::{DeriveProgress, Progress};
 use super::blocks::Blocks;
@@ -30,16 +30,16 @@ pub(super) async fn land(
     // Bins are kept in the order of the calendar, which is that of their periods.
     let store = engine.store();
     let mut steps = vec![];
-    let mut columns = vec![];
+    let mut found = Found::nothing(source.grid.cell_count());
     for (output, values) in plan.outputs.iter().zip(all) {
         let values: Vec<f32> = values
             .iter()
             .map(|value| (value * plan.factor) as f32)
             .collect();
         steps.push(step(store, source, target, output, &values).await?);
-        columns.push(values);
+        found.add(&values);
     }
-    finished(store, source, target, plan, steps, &columns).await
+    manifest(store, source, target, plan, steps, &found).await
 }
 
 /// A statistic of every cell, `[output][row, col]`, stored unit, NaN where there is none.
@@ -64,10 +64,11 @@ pub(super) async fn computed(
     }
     let mut all = vec![vec![f64::NAN; cell_count]; outputs];
     let blocks = Blocks::of(source);
+    let values = engine.values(source, &source.id()).await?;
     let step_count = source.steps.len();
     let mut done = 0;
     for run in blocks.runs() {
-        let cells = blocks.read(engine, source, run).await?;
+        let cells = blocks.read(&values, source, run).await?;
         let (of_cell, read) = (Arc::clone(&of_cell), plan.read.clone());
         let computing = move || {
             let mut found = vec![f64::NAN; cells.places.len() * outputs];
@@ -111,28 +112,6 @@ pub(super) async fn step(
     })
 }
 
-/// Stores series and domain of a few steps.
-async fn finished(
-    store: &Store,
-    source: &Manifest,
-    target: &ProductId,
-    plan: &Plan,
-    steps: Vec<Step>,
-    columns: &[Vec<f32>],
-) -> Result<Manifest, ComputeError> {
-    let views: Vec<&[f32]> = columns.iter().map(Vec::as_slice).collect();
-    let segment = SeriesSegment {
-        first_step: 0,
-        steps: steps.len() as u32,
-        series: series::write(store, target, &source.grid, &views).await?,
-    };
-    let mut found = Found::nothing(source.grid.cell_count());
-    for values in columns {
-        found.add(values);
-    }
-    manifest(store, source, target, plan, (steps, vec![segment]), &found).await
-}
-
 /// What all steps together hold.
 pub(super) struct Found {
     /// Cells that hold data in some step.
@@ -166,7 +145,7 @@ pub(super) async fn manifest(
     source: &Manifest,
     target: &ProductId,
     plan: &Plan,
-    (steps, series): (Vec<Step>, Vec<SeriesSegment>),
+    steps: Vec<Step>,
     found: &Found,
 ) -> Result<Manifest, ComputeError> {
     if !found.cells.contains(&true) {
@@ -193,7 +172,7 @@ pub(super) async fn manifest(
         grid: source.grid,
         steps,
         domain: domain::write(store, target, &found.cells).await?,
-        series,
+        series: vec![],
         derived_from: Some(source.id()),
         computed: None,
         notices: vec![],
