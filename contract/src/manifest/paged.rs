@@ -218,6 +218,7 @@ mod tests {
             domain: ObjectKey::domain(&product, &Digest::of(b"")),
             series: vec![],
             derived_from: Some("q@3-0a1b2c3d".parse().unwrap()),
+            computed: None,
             notices: NoticeRun::of(&(0..days).map(order).collect::<Vec<_>>()),
             product,
         }
