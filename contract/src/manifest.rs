@@ -1,13 +1,11 @@
 //! The numbered list of what a product consists of: the only thing that changes, and it changes whole.
 
+mod id;
 mod inside;
 mod paged;
 
-use std::fmt::{Display, Formatter};
-
 use serde::{Deserialize, Serialize};
 
-use crate::ContractError;
 use crate::computed::Computed;
 use crate::digest::Digest;
 use crate::grid::Grid;
@@ -18,6 +16,7 @@ use crate::product::ProductId;
 use crate::quantity::Quantity;
 use crate::time::{Period, TimeMs};
 
+pub use id::ManifestId;
 pub use paged::{PAGE_STEPS, PAGED_SCHEMA, Page, PagedManifest};
 
 /// Version of the manifest's JSON as it is written. Those since [`OLDEST_MANIFEST_SCHEMA`] are read too.
@@ -124,11 +123,11 @@ impl Manifest {
 
     /// The name that answers cite.
     pub fn id(&self) -> ManifestId {
-        ManifestId {
-            product: self.product.clone(),
-            number: self.number,
-            short_sha256: Digest::of_json(self).short(),
-        }
+        ManifestId::new(
+            self.product.clone(),
+            self.number,
+            Digest::of_json(self).short(),
+        )
     }
 
     /// Of each step the place of its file in the order of notices, as far as it is known.
@@ -207,66 +206,6 @@ pub struct Bracket {
     pub after: usize,
     /// 0 at `before`, towards 1 at `after`.
     pub weight: f64,
-}
-
-/// Name of one manifest: `product@number-digest`, with the first eight digits of its digest.
-#[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(try_from = "String", into = "String")]
-pub struct ManifestId {
-    /// Product.
-    pub product: ProductId,
-    /// Number.
-    pub number: u64,
-    /// First eight digits of the digest of the manifest's canonical JSON.
-    short_sha256: String,
-}
-
-impl Display for ManifestId {
-    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{}@{}-{}", self.product, self.number, self.short_sha256)
-    }
-}
-
-impl std::str::FromStr for ManifestId {
-    type Err = ContractError;
-
-    fn from_str(s: &str) -> Result<Self, Self::Err> {
-        let bad = || {
-            ContractError::invalid(
-                "manifest",
-                s,
-                "product@number-digest, such as takahashi09-flux@12-0a1b2c3d",
-            )
-        };
-        let (product, rest) = s.split_once('@').ok_or_else(bad)?;
-        let (number, short) = rest.split_once('-').ok_or_else(bad)?;
-        if short.len() != 8
-            || !short
-                .bytes()
-                .all(|b| matches!(b, b'0'..=b'9' | b'a'..=b'f'))
-        {
-            return Err(bad());
-        }
-        Ok(Self {
-            product: product.parse()?,
-            number: number.parse().map_err(|_not_a_number| bad())?,
-            short_sha256: short.to_owned(),
-        })
-    }
-}
-
-impl TryFrom<String> for ManifestId {
-    type Error = ContractError;
-
-    fn try_from(s: String) -> Result<Self, Self::Error> {
-        s.parse()
-    }
-}
-
-impl From<ManifestId> for String {
-    fn from(id: ManifestId) -> Self {
-        id.to_string()
-    }
 }
 
 #[cfg(test)]
