@@ -307,13 +307,11 @@ impl Plan {
 
 /// What a step is made of, for people, and where functions were called outside the range of their papers.
 fn origin(step: &Matched, outside: &BTreeMap<String, u64>) -> String {
-    let mut text = format!("computed from {}", step.origin);
-    for (name, count) in outside {
-        text.push_str(&format!(
-            "; {name} outside the range of its paper in {count} cells"
-        ));
-    }
-    text
+    let counts = outside
+        .iter()
+        .map(|(name, count)| format!("; {name} outside the range of its paper in {count} cells"));
+    let counts: String = counts.collect();
+    format!("computed from {}{counts}", step.origin)
 }
 
 fn not_asked() -> ComputeError {

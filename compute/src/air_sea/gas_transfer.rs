@@ -32,7 +32,7 @@ pub fn wanninkhof1992(wind_moment2_m2_s2: f64, schmidt: f64) -> f64 {
 
 /// `k = 0.0283 <U³> (Sc/660)^-½`, short-term winds.
 ///
-/// Source: Wanninkhof and McGillis (1999), doi:10.1029/1999GL900363.
+/// Source: Wanninkhof and `McGillis` (1999), doi:10.1029/1999GL900363.
 pub fn wanninkhof_mcgillis1999(wind_moment3_m3_s3: f64, schmidt: f64) -> f64 {
     scaled(0.0283 * wind_moment3_m3_s3, schmidt, SEA_20)
 }
@@ -50,7 +50,7 @@ pub fn nightingale2000(wind_m_s: f64, wind_moment2_m2_s2: f64, schmidt: f64) -> 
 
 /// `k = (3.3 + 0.026 <U³>) (Sc/660)^-½`, from eddy covariance (GasEx-98).
 ///
-/// Source: McGillis et al. (2001), doi:10.1029/2000JC000506.
+/// Source: `McGillis` et al. (2001), doi:10.1029/2000JC000506.
 pub fn mcgillis2001(wind_moment3_m3_s3: f64, schmidt: f64) -> f64 {
     scaled(3.3 + 0.026 * wind_moment3_m3_s3, schmidt, SEA_20)
 }

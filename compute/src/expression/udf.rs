@@ -4,7 +4,7 @@ use std::hash::{Hash, Hasher};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use datafusion::arrow::array::{Array as _, AsArray as _, Float64Array};
+use datafusion::arrow::array::{Array as _, AsArray, Float64Array};
 use datafusion::arrow::datatypes::{DataType, Float64Type};
 use datafusion::common::{Result, exec_err};
 use datafusion::logical_expr::{
@@ -84,7 +84,7 @@ impl ScalarUDFImpl for NumberFunction {
         }
         let columns: Vec<&Float64Array> = columns
             .iter()
-            .map(|column| column.as_primitive::<Float64Type>())
+            .map(AsArray::as_primitive::<Float64Type>)
             .collect();
         let (mut values, mut outside) = (vec![0.0; columns.len()], 0);
         let mut of_row = |row: usize| {

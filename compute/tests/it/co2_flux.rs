@@ -108,7 +108,6 @@ async fn the_takahashi_run_comes_out_of_products_month_by_month() {
             quantity(name),
             ONE_DEGREE,
             &read(&files, variable, si),
-            12,
         )
         .await;
     }
@@ -194,7 +193,7 @@ async fn the_socat_run_with_a_cool_and_salty_skin_comes_out_of_products_month_by
             .zip(maps)
             .map(|(period, map)| (period, map.iter().map(none).collect()))
             .collect();
-        land(&store, &id, quantity(name), ONE_DEGREE, &steps, 12).await;
+        land(&store, &id, quantity(name), ONE_DEGREE, &steps).await;
         sources.push((name, (id, matching)));
     }
     let flux = Co2Flux {
