@@ -126,7 +126,7 @@ pub(super) fn band(
 }
 
 /// What the lines are, in the upper left corner.
-pub(super) fn legend(chart: &mut Chart<'_, '_>) -> Result<(), Failed> {
+pub(super) fn legend<'a, 'b: 'a>(chart: &mut Chart<'a, 'b>) -> Result<(), Failed> {
     chart
         .configure_series_labels()
         .position(SeriesLabelPosition::UpperLeft)
