@@ -42,7 +42,7 @@ fn rising(month: u32) -> f32 {
 }
 
 async fn wind(store: &Store, name: &str, steps: &[(Period, Vec<f32>)]) -> Manifest {
-    land(store, &product(name), Quantity::WindSpeed, GRID, steps, 48).await
+    land(store, &product(name), Quantity::WindSpeed, GRID, steps).await
 }
 
 fn region(name: &str, region: &str) -> SeriesQuery {
@@ -187,7 +187,6 @@ async fn periods_versions_and_products_are_compared() {
         Quantity::IceFraction,
         GRID,
         &months(12, |_, _| 0.5),
-        12,
     )
     .await;
     let engine = Engine::in_process(store.clone(), parts(2));

@@ -46,15 +46,7 @@ fn steps() -> Vec<(Period, Vec<f32>)> {
 }
 
 async fn landed(store: &Store) -> Manifest {
-    land(
-        store,
-        &product("wind"),
-        Quantity::WindSpeed,
-        GRID,
-        &steps(),
-        20,
-    )
-    .await
+    land(store, &product("wind"), Quantity::WindSpeed, GRID, &steps()).await
 }
 
 async fn derived(engine: &Engine, options: &MapOptions) -> Result<Manifest, ComputeError> {
@@ -123,15 +115,7 @@ async fn a_climatology_is_a_product_of_twelve_months() {
     // One July more, and it is made anew.
     let mut more = steps();
     more[30].1[at(4, 0)] += 3.0;
-    land(
-        &store,
-        &product("wind"),
-        Quantity::WindSpeed,
-        GRID,
-        &more,
-        36,
-    )
-    .await;
+    land(&store, &product("wind"), Quantity::WindSpeed, GRID, &more).await;
     let anew = derived(&engine, &options).await.unwrap();
     assert_eq!(anew.number, 2);
     assert_eq!(
@@ -231,7 +215,7 @@ async fn trends_and_their_chances_are_maps_of_their_own_quantities() {
         })
         .collect();
     let sst = Quantity::SeaSurfaceTemperature;
-    land(&store, &product("wind"), sst, GRID, &steps, 30).await;
+    land(&store, &product("wind"), sst, GRID, &steps).await;
     let engine = Engine::in_process(store.clone(), parts(2));
     let trend = derived(&engine, &MapOptions::new(MapStatistic::Trend))
         .await
@@ -271,7 +255,6 @@ async fn what_is_no_statistic_is_refused_with_the_reason() {
         Quantity::SeaSurfaceTemperature,
         GRID,
         &sst,
-        1,
     )
     .await;
     let engine = Engine::in_process(store.clone(), parts(1));
@@ -328,7 +311,6 @@ async fn what_is_no_statistic_is_refused_with_the_reason() {
                 Quantity::SeaSurfaceTemperature,
                 GRID,
                 &sst,
-                1,
             )
             .await;
         }
