@@ -23,6 +23,7 @@ mod exact;
 pub mod flow;
 pub mod geometry;
 pub mod grid;
+pub mod heights;
 pub mod isolines;
 pub mod job;
 pub mod key;

@@ -17,7 +17,7 @@ use tower_http::set_header::response::SetMultipleResponseHeadersLayer;
 
 use crate::error::ServerError;
 use crate::middleware::{body, panics::CountPanics, security, track};
-use crate::routes::picture::{COVERED, SHOWN_TIME};
+use crate::routes::picture::{COVERED, HEIGHTS_END, HEIGHTS_WITHIN, SHOWN_TIME};
 use crate::routes::{
     analysis, area, budget, check, correlation, difference, events, globe, health, hovmoller,
     legend, line, metrics, observations, openapi, palettes, platforms, point, products, regions,
@@ -39,7 +39,13 @@ pub fn router(state: AppState) -> Router {
         .allow_methods([Method::GET, Method::HEAD])
         // Everybody gets the same headers: caches on the way need one copy for all pages.
         .vary([])
-        .expose_headers([SHOWN_TIME, COVERED, header::CONTENT_LOCATION]);
+        .expose_headers([
+            SHOWN_TIME,
+            COVERED,
+            HEIGHTS_END,
+            HEIGHTS_WITHIN,
+            header::CONTENT_LOCATION,
+        ]);
     // What a request waited for goes on after its time only if somebody else waits for it too, or comes again (`pictures.rs`).
     let limit_s = state.settings.request_limit_s;
     let timed_out = move |_elapsed: BoxError| async move { ServerError::TimedOut { limit_s } };

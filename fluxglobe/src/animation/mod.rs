@@ -27,7 +27,7 @@ use tile_server::backend::{Draw, Keep, Turn};
 use crate::cli::{RenderAnimation, Settings};
 use crate::picture::Extras;
 use crate::ports::{Drawer, FleetDrawer};
-use crate::{deployment, picture, progress};
+use crate::{deployment, heights, picture, progress};
 use film::Film;
 use path::CameraPath;
 use shots::Shots;
@@ -45,6 +45,10 @@ pub(crate) async fn run(settings: &Settings, store: Store, options: RenderAnimat
     }
     film::check(&options)?;
     let shots = Arc::new(shots(settings, &store, &options).await?);
+    let jobs = (0..shots.count()).map(|number| shots.job(number));
+    if let Some(note) = heights::note_of_film(&store, &jobs.collect::<Result<Vec<_>>>()?).await? {
+        progress::say(&note);
+    }
     let drawer = drawer(settings, store, &options).await?;
     let mut film = Film::open(&options, &shots)?;
     let missing = film.missing(&shots)?;

@@ -2,10 +2,11 @@
 
 use contract::annotation::Annotations;
 use contract::grid::LonLatDeg;
+use contract::heights::HEIGHT_LIMIT_M;
 use contract::job::RenderJob;
 use contract::quantity::Quantity;
 use legend::{LegendError, ticks};
-use render::plan::{HEIGHT_LIMIT_M, Projection};
+use render::plan::Projection;
 
 use super::page::{Corner, Page};
 use super::panel::Panel;

@@ -5,6 +5,7 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use contract::camera::CORE_DEPTH_M;
 use contract::earth::SPHERE_RADIUS_M;
 use contract::grid::Grid;
+use contract::heights::{HEIGHT_LIMIT_M, SHEET_M};
 use contract::job::{Mode, RenderJob};
 use glam::{DVec3, UVec2};
 
@@ -32,7 +33,7 @@ const CROWDED_COSINE: f64 = 0.25;
 const NEAREST_OVER_FARTHEST: f64 = 4.0;
 
 // The core hides nothing that is drawn.
-const _: () = assert!(CORE_DEPTH_M > look::HEIGHT_LIMIT_M + look::SHEET_M);
+const _: () = assert!(CORE_DEPTH_M > HEIGHT_LIMIT_M + SHEET_M);
 
 /// The part of the shell that is drawn; lengths in earth radii.
 struct Cap<'a> {

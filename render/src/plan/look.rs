@@ -3,10 +3,6 @@
 use contract::base_map::BaseMap;
 use contract::job::{Mode, RenderJob, View};
 
-/// Thickness of the sheet that particles fill where they are not lifted or sunk, m.
-pub(super) const SHEET_M: f64 = 20_000.0;
-/// Farthest a particle is lifted or sunk, m: bounds how far beyond a tile particles must be looked for.
-pub const HEIGHT_LIMIT_M: f64 = 1.2e6;
 /// Turns of a particle through its column for each kg m⁻²: at 60 g m⁻² a year it rises three times a year.
 pub(super) const TURNS_PER_KG_M2: f32 = 50.0;
 /// Share of the optical depth that a cell without flux keeps.
@@ -25,9 +21,6 @@ pub(super) const LIGHT_DEPTH: f64 = 0.6;
 pub(super) const MAP_ALPHA: f32 = 0.9;
 /// Pixels north that a metre of height moves a particle, in pixels a metre: the slope of the view of map tiles.
 pub(super) const OBLIQUE: f64 = 0.35;
-/// Farthest a particle of a map tile is lifted or sunk, pixels: in deep zoom levels all heights are scaled down alike,
-/// so that particles stay near their cells and shadows fall on the next tile at most.
-pub(super) const MOST_LIFT_PX: f64 = 120.0;
 /// Largest particle, pixels: keeps positions and reaches far inside 32-bit integers.
 pub(super) const MAX_RADIUS_PX: f32 = 100_000.0;
 /// Shadows of a lower sun would fall far beyond a tile.

@@ -26,6 +26,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use contract::colour::Scale;
 use contract::earth::Earth;
 use contract::grid::Grid;
+use contract::heights::{HEIGHT_LIMIT_M, SHEET_M};
 use contract::job::{Mode, RenderJob, View};
 use glam::{UVec2, Vec3};
 
@@ -50,7 +51,6 @@ use look::Look;
 
 pub use isolines::graticule_step_deg;
 pub use later::Later;
-pub use look::HEIGHT_LIMIT_M;
 pub use projection::{Projection, Seen};
 
 /// 0 stands for no plan.
@@ -340,8 +340,8 @@ fn common(job: &RenderJob, scene: &Scene) -> Params {
             depth_floor: shape::depth_floor(transfer),
             optical_depth: style.optical_depth as f32,
             height_m_per_kg_m2: style.height_m_per_kg_m2 as f32,
-            height_limit_m: look::HEIGHT_LIMIT_M as f32,
-            sheet_m: look::SHEET_M as f32,
+            height_limit_m: HEIGHT_LIMIT_M as f32,
+            sheet_m: SHEET_M as f32,
             turns_per_kg_m2: look::TURNS_PER_KG_M2,
             sea_per_m: style.context.sea_extinction_per_m() as f32,
         },
@@ -417,11 +417,10 @@ fn palette(job: &RenderJob) -> Vec<u32> {
 fn height_range_m(job: &RenderJob, scene: &Scene) -> [f64; 2] {
     let [low, high] = scene.accumulated.as_ref().map_or([0.0; 2], Interval::range);
     let scaled = |kg_m2: f32| {
-        (f64::from(kg_m2) * job.style.height_m_per_kg_m2)
-            .clamp(-look::HEIGHT_LIMIT_M, look::HEIGHT_LIMIT_M)
+        (f64::from(kg_m2) * job.style.height_m_per_kg_m2).clamp(-HEIGHT_LIMIT_M, HEIGHT_LIMIT_M)
     };
     // Half the sheet, and a metre so that rounding cannot put a particle outside.
-    let sheet = 0.5 * look::SHEET_M + 1.0;
+    let sheet = 0.5 * SHEET_M + 1.0;
     [scaled(low).min(0.0) - sheet, scaled(high).max(0.0) + sheet]
 }
 

@@ -4,8 +4,8 @@
 use std::f64::consts::{PI, TAU};
 use std::ops::Range;
 
-use contract::earth::WGS84_EQUATORIAL_RADIUS_M;
 use contract::grid::Grid;
+use contract::heights::{kept_share, px_per_m};
 use contract::job::{Mode, RenderJob};
 use contract::tile::{MAX_LAT_DEG, Tile, mercator_lat_deg, mercator_x, mercator_y};
 use glam::DVec2;
@@ -47,7 +47,7 @@ pub(super) fn plan(plan: &mut Plan, job: &RenderJob, scene: &Scene, (tile, size_
             f64::from(tile.y) * f64::from(size_px),
         ],
         size_px: f64::from(size_px),
-        px_per_m: world_px / (TAU * WGS84_EQUATORIAL_RADIUS_M),
+        px_per_m: px_per_m(tile, size_px),
     };
     plan.params.view.kind = VIEW_TILE;
     if job.mode == Mode::Map {
@@ -69,8 +69,8 @@ pub(super) fn plan(plan: &mut Plan, job: &RenderJob, scene: &Scene, (tile, size_
         job.style.optical_depth,
     );
     let heights_m = height_range_m(job, scene);
-    let highest_px = heights_m[1].max(-heights_m[0]) * level.px_per_m;
-    let flattened = (look::MOST_LIFT_PX / highest_px).min(1.0);
+    let highest_m = heights_m[1].max(-heights_m[0]);
+    let flattened = kept_share(level.px_per_m, highest_m);
     let heights_m = heights_m.map(|height_m| height_m * flattened);
     let Params {
         particles: own,

@@ -119,6 +119,7 @@ pub(crate) struct GlobeQuery {
                 ("content-location" = String, description = "The address that names everything which shapes this picture, where the one asked does not"),
                 ("fluxglobe-time" = String, description = "The instant that is shown, ISO 8601"),
                 ("fluxglobe-time-covered" = String, description = "`start/end` of what there is, where another instant is shown than was asked for"),
+                ("fluxglobe-heights-end" = String, description = "Accumulated carbon at which heights end, where particles are lifted by it: columns of more are drawn no higher or deeper"),
             )),
         (status = 304, description = "The copy that `If-None-Match` names is still right"),
     ),

@@ -4,6 +4,7 @@
 use axum::http::{HeaderMap, HeaderName, StatusCode, header};
 use axum::response::{IntoResponse as _, Response};
 use contract::job::RenderJob;
+use contract::quantity::Quantity;
 use contract::time::{Period, TimeMs};
 
 use crate::catalogue::Layer;
@@ -21,6 +22,11 @@ pub(crate) const CACHE_CONTROL_PINNED: &str = "public, max-age=31536000, immutab
 pub(crate) const SHOWN_TIME: HeaderName = HeaderName::from_static("fluxglobe-time");
 /// What the product covers; only where another instant was asked for than is shown.
 pub(crate) const COVERED: HeaderName = HeaderName::from_static("fluxglobe-time-covered");
+
+/// Accumulated carbon at which heights end; only where particles are lifted.
+pub(crate) const HEIGHTS_END: HeaderName = HeaderName::from_static("fluxglobe-heights-end");
+/// Pixels that heights end at; only on map tiles so deep that heights to scale may be more.
+pub(crate) const HEIGHTS_WITHIN: HeaderName = HeaderName::from_static("fluxglobe-heights-within");
 
 /// Which instant a picture shows of those that were asked for.
 pub(crate) struct Shown {
@@ -57,6 +63,24 @@ impl Shown {
     }
 }
 
+/// Where heights of a picture end, for those who read no height bar.
+fn heights_headers(job: &RenderJob) -> HeaderMap {
+    let value = |text: String| text.parse().expect("numbers and units are printable");
+    let mut headers = HeaderMap::new();
+    if let Some(kg_m2) = job.heights_end_kg_m2() {
+        // A header holds no raised figures.
+        let g_m2 = Quantity::AccumulatedCarbon.display().shown(kg_m2);
+        headers.insert(
+            HEIGHTS_END,
+            value(format!("{} g C m-2", (g_m2 * 1e3).round() / 1e3)),
+        );
+    }
+    if let Some(px) = job.heights_within_px() {
+        headers.insert(HEIGHTS_WITHIN, value(format!("{px} px")));
+    }
+    headers
+}
+
 /// The picture of a job. The entity tag is the job's digest: the same job is the same picture, byte for byte, so a
 /// client that has it is answered without drawing or reading anything.
 pub(crate) async fn respond(
@@ -77,13 +101,14 @@ pub(crate) async fn respond(
         (header::ETAG, tag.clone()),
         (header::CACHE_CONTROL, cache_control.to_owned()),
     ];
+    let told = (shown.headers(), heights_headers(&job));
     if has_tag(asked, &tag) {
         state.metrics.hit(Source::Client);
-        return Ok((StatusCode::NOT_MODIFIED, headers, shown.headers()).into_response());
+        return Ok((StatusCode::NOT_MODIFIED, headers, told.0, told.1).into_response());
     }
     let picture = state.pictures.get(digest, job).await?;
     let content = [(header::CONTENT_TYPE, "image/png")];
-    Ok((headers, shown.headers(), content, picture).into_response())
+    Ok((headers, told.0, told.1, content, picture).into_response())
 }
 
 /// Does `If-None-Match` name the tag? Weak comparison, as RFC 9110, 13.1.2 asks for.

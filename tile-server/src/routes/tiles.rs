@@ -81,6 +81,8 @@ pub(crate) struct TileQuery {
                 ("cache-control" = String, description = "`immutable` where the address names `time`, `manifest` and the edition of now"),
                 ("fluxglobe-time" = String, description = "The instant that is shown, ISO 8601"),
                 ("fluxglobe-time-covered" = String, description = "`start/end` of what there is, where another instant is shown than was asked for"),
+                ("fluxglobe-heights-end" = String, description = "Accumulated carbon at which heights end, where particles are lifted by it: columns of more are drawn no higher or deeper"),
+                ("fluxglobe-heights-within" = String, description = "Pixels that heights end at: where to scale they would be more, all heights of the zoom level are drawn lower alike"),
             )),
         (status = 304, description = "The copy that `If-None-Match` names is still right"),
     ),

@@ -37,6 +37,52 @@ async fn a_tile_is_the_picture_of_the_job_its_address_means() {
 }
 
 #[tokio::test]
+async fn answers_say_where_heights_end_and_where_they_may_be_flattened() {
+    let app = TestApp::new().await;
+    let of = async |path: &str| {
+        let answer = app.get(path).await;
+        assert_eq!(answer.status, StatusCode::OK, "{path}: {}", answer.text());
+        let names = ["fluxglobe-heights-end", "fluxglobe-heights-within"];
+        names.map(|name| answer.header(name).to_owned())
+    };
+    // 1200 km at 8000 km for a kilogram a square metre.
+    assert_eq!(of("/globe/flux/volume.png").await, ["150 g C m-2", ""]);
+    let higher = "/globe/flux/points.png?height_exaggeration=1.9e7";
+    assert_eq!(of(higher).await, ["63.158 g C m-2", ""]);
+    // 1210 km are 124 pixels at zoom 4, half of them at zoom 3.
+    assert_eq!(
+        of("/tiles/flux/volume/3/0/0.png").await,
+        ["150 g C m-2", ""]
+    );
+    for deep in [
+        "/tiles/flux/volume/4/0/0.png",
+        "/tiles/flux/volume/3/0/0@2x.png",
+    ] {
+        assert_eq!(of(deep).await, ["150 g C m-2", "120 px"], "{deep}");
+    }
+    for flat in [
+        "/tiles/flux/map/4/0/0.png",
+        "/tiles/sst/volume/4/0/0.png",
+        "/tiles/flux/volume/4/0/0.png?height_exaggeration=0",
+    ] {
+        assert_eq!(of(flat).await, ["", ""], "{flat}");
+    }
+    // So do those that say that a copy is still right, and pages of other origins may read it.
+    let path = "/tiles/flux/volume/4/0/0.png";
+    let tag = app.get(path).await.header("etag").to_owned();
+    let asked = [
+        ("if-none-match", tag.as_str()),
+        ("origin", "http://map.example"),
+    ];
+    let again = app.get_with(path, &asked).await;
+    assert_eq!(again.status, StatusCode::NOT_MODIFIED);
+    assert_eq!(again.header("fluxglobe-heights-end"), "150 g C m-2");
+    let exposed = again.header("access-control-expose-headers");
+    assert!(exposed.contains("fluxglobe-heights-end"), "{exposed}");
+    assert!(exposed.contains("fluxglobe-heights-within"), "{exposed}");
+}
+
+#[tokio::test]
 async fn every_mode_has_its_own_picture() {
     let app = TestApp::new().await;
     let mut pictures = vec![];

@@ -2216,6 +2216,8 @@ export interface operations {
                     "content-location"?: string;
                     /** @description Names the job: the same tag is the same picture, byte for byte */
                     etag?: string;
+                    /** @description Accumulated carbon at which heights end, where particles are lifted by it: columns of more are drawn no higher or deeper */
+                    "fluxglobe-heights-end"?: string;
                     /** @description The instant that is shown, ISO 8601 */
                     "fluxglobe-time"?: string;
                     /** @description `start/end` of what there is, where another instant is shown than was asked for */
@@ -2738,6 +2740,10 @@ export interface operations {
                     "cache-control"?: string;
                     /** @description Names the job: the same tag is the same picture, byte for byte */
                     etag?: string;
+                    /** @description Accumulated carbon at which heights end, where particles are lifted by it: columns of more are drawn no higher or deeper */
+                    "fluxglobe-heights-end"?: string;
+                    /** @description Pixels that heights end at: where to scale they would be more, all heights of the zoom level are drawn lower alike */
+                    "fluxglobe-heights-within"?: string;
                     /** @description The instant that is shown, ISO 8601 */
                     "fluxglobe-time"?: string;
                     /** @description `start/end` of what there is, where another instant is shown than was asked for */
