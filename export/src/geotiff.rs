@@ -154,7 +154,10 @@ fn escaped(text: &str) -> String {
             '&' => plain += "&amp;amp;",
             c if c.is_control() => plain.push(' '),
             c if c.is_ascii() && !matches!(c, '<' | '>' | '"') => plain.push(c),
-            c => plain.push_str(&format!("&#{};", u32::from(c))),
+            c => {
+                let reference = format!("&#{};", u32::from(c));
+                plain.push_str(&reference);
+            }
         }
     }
     plain

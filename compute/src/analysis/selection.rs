@@ -79,10 +79,6 @@ fn of_ordered(bits: u64) -> f64 {
 }
 
 #[cfg(test)]
-#[expect(
-    clippy::float_cmp,
-    reason = "selected values are values that were given"
-)]
 mod tests {
     use super::*;
     use proptest::prelude::*;

@@ -212,6 +212,7 @@ async fn periods_versions_and_products_are_compared() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+#[expect(clippy::too_many_lines, reason = "one product, asked in many ways")]
 async fn bands_are_means_by_area_and_time_and_say_what_they_cover() {
     let (_folder, store) = folder_store();
     // Row and month; the western half of the second month is missing, and row 4 never has data.

@@ -18,6 +18,7 @@ use crate::fixture::{ONE_DEGREE, ask, folder_store, land, months, parts, product
 use crate::fluxengine::{Run, assert_close, land_mask, runs};
 
 /// Inputs by their names in the computation: variable, quantity, and what makes its values SI.
+#[expect(clippy::type_complexity, reason = "a table of a test")]
 const INPUTS: [(&str, &str, fn(f64) -> f64); 7] = [
     ("temperature", "SST_t", |celsius| celsius + 273.15),
     ("salinity", "salinity", |it| it),

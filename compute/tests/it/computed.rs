@@ -207,7 +207,9 @@ async fn asked_again_it_is_there_and_after_a_revision_the_other_steps_are_kept()
     for (index, step) in wind.steps.iter().enumerate() {
         let mut values = values(&store, &wind, index).await;
         if index == 4 {
-            values.iter_mut().for_each(|value| *value += 1.0);
+            for value in values.iter_mut() {
+                *value += 1.0;
+            }
         }
         steps.push((step.period, values));
     }
@@ -316,6 +318,7 @@ async fn what_makes_no_sense_is_refused_before_anything_is_stored() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+#[expect(clippy::too_many_lines, reason = "one way from beginning to end")]
 async fn a_product_brought_to_another_grid_keeps_its_integral_and_fits_in_an_expression() {
     let (_folder, store) = folder_store();
     let year = wavy_year(&ONE_DEGREE);

@@ -245,6 +245,7 @@ async fn trends_and_their_chances_are_maps_of_their_own_quantities() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+#[expect(clippy::too_many_lines, reason = "a list of cases")]
 async fn what_is_no_statistic_is_refused_with_the_reason() {
     let (_folder, store) = folder_store();
     landed(&store).await;

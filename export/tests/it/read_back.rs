@@ -115,7 +115,7 @@ fn read_back(format: Format, name: &str, quantity: Quantity) {
         },
         |told| told["lat"][3] = json!(told["lat"][3].as_f64().unwrap() + 1e-9),
         |told| {
-            told["steps"][2]["end_ms"] = json!(told["steps"][2]["end_ms"].as_i64().unwrap() + 1000)
+            told["steps"][2]["end_ms"] = json!(told["steps"][2]["end_ms"].as_i64().unwrap() + 1000);
         },
     ];
     for (number, change) in wrong.into_iter().enumerate() {

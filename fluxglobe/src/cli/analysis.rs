@@ -19,6 +19,7 @@ const HEADING: &str = "Made of the series";
 
 /// What is made of a series, in place of the series itself; several together.
 #[derive(Debug, Args)]
+#[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
 pub(crate) struct Analysis {
     /// Mean, spread and count of each part of the year (--bins) over the years of --base.
     #[arg(long, help_heading = HEADING)]
@@ -210,7 +211,7 @@ impl FromStr for PlotFile {
 
     fn from_str(text: &str) -> Result<Self, Self::Err> {
         let path = PathBuf::from(text);
-        let ending = path.extension().map(|ending| ending.to_ascii_lowercase());
+        let ending = path.extension().map(std::ffi::OsStr::to_ascii_lowercase);
         let form = match ending.as_ref().and_then(|ending| ending.to_str()) {
             Some("svg") => PlotForm::Svg,
             Some("png") => PlotForm::Png,

@@ -75,7 +75,7 @@ pub(crate) struct Expression {
     #[arg(long)]
     pub(crate) name: Option<ProductId>,
     /// What the result is, such as `carbon_flux` (positive out of the sea) or `wind_speed`, or NAME:UNIT for anything else
-    /// ("wind_moment2:m2 s-2"); its unit must be that of the expression.
+    /// (`wind_moment2:m2 s-2`); its unit must be that of the expression.
     #[arg(long, value_parser = quantity)]
     pub(crate) quantity: Option<Quantity>,
     /// NAME=PRODUCT or NAME=PRODUCT:climatology or NAME=PRODUCT:any-time; a name each in the expression.

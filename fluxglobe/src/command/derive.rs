@@ -169,11 +169,13 @@ fn functions() -> Result<()> {
     let mut text = String::new();
     for function in compute::expression::function::ALL {
         text.push_str(&function.signature());
-        text.push_str(&format!("\n    {}; {}\n", function.what, function.source));
+        let what = format!("\n    {}; {}\n", function.what, function.source);
+        text.push_str(&what);
         for argument in function.arguments {
             if let Some([low, high]) = argument.range {
                 let (name, unit) = (argument.name, argument.unit);
-                text.push_str(&format!("    {name} from {low} to {high} {unit}\n"));
+                let range = format!("    {name} from {low} to {high} {unit}\n");
+                text.push_str(&range);
             }
         }
     }

@@ -102,6 +102,10 @@ fn on_page(
     Ok(())
 }
 
+#[expect(
+    clippy::trivially_copy_pass_by_ref,
+    reason = "colours of plotters are borrowed"
+)]
 fn style(size: i32, colour: &RGBColor) -> TextStyle<'static> {
     TextStyle {
         color: colour.to_backend_color(),

@@ -51,6 +51,7 @@ impl TimeAxis {
     }
 
     /// What a place is called: `2000`, or `2000-03`.
+    #[expect(clippy::trivially_copy_pass_by_ref, reason = "plotters asks so")]
     pub(super) fn text(&self, place: &f64) -> String {
         if self.per_year < 2.0 {
             return format!("{place:.0}");

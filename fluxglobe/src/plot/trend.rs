@@ -37,6 +37,10 @@ struct Line {
     colour: RGBColor,
 }
 
+#[expect(
+    clippy::too_many_lines,
+    reason = "one picture, drawn from top to bottom"
+)]
 fn drawn_trend(area: &Area<'_>, answer: &SeriesAnalysis, trend: &Trend) -> Result<(), Failed> {
     let points: Vec<Point> = trend
         .values
