@@ -20,7 +20,7 @@ const COMMITTED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/openapi.json");
 const ROUTER: &str = include_str!("../../src/router.rs");
 
 /// One address of every operation, and what is sent along.
-const ASKED: [(&str, &str); 25] = [
+const ASKED: [(&str, &str); 26] = [
     (
         "/tiles/{product}/{mode}/{z}/{x}/{y}.png",
         "/tiles/flux/volume/1/0/1@2x.png",
@@ -51,6 +51,10 @@ const ASKED: [(&str, &str); 25] = [
     (
         "/api/products/{product}/area",
         "/api/products/sst/area?region=global",
+    ),
+    (
+        "/api/products/{product}/line",
+        "/api/products/sst/line?line=0,0;10,10",
     ),
     (
         "/api/products/{product}/analysis",
