@@ -126,6 +126,23 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/products/{product}/analysis": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** Climatology, anomaly, trend, season and extremes of a series. What is not defined for it stands in `refused` with the reason. */
+        get: operations["analysis"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/products/{product}/area": {
         parameters: {
             query?: never;
@@ -160,6 +177,57 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/products/{product}/correlation": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** The correlation of two products over a region or at a place, at every lag. */
+        get: operations["correlation"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/products/{product}/difference": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** The mean over time of one product, version or period less that of another, with its standard error. */
+        get: operations["difference"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/products/{product}/hovmoller": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** Means of bands of latitude or longitude, step by step. */
+        get: operations["hovmoller"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/products/{product}/legend.{form}": {
         parameters: {
             query?: never;
@@ -169,6 +237,23 @@ export interface paths {
         };
         /** What the colours of a layer mean: numbers, a drawing or pixels. */
         get: operations["legend"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/products/{product}/line": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** Statistics along a line, by length. */
+        get: operations["line"];
         put?: never;
         post?: never;
         delete?: never;
@@ -372,6 +457,54 @@ export interface components {
             verdict: components["schemas"]["Verdict"];
         };
         /**
+         * @description What bands lie along.
+         * @enum {string}
+         */
+        Along: "lat" | "lon";
+        /**
+         * @description One thing that is made of a series.
+         * @enum {string}
+         */
+        AnalysisPart: "climatology" | "anomaly" | "trend" | "season" | "extremes";
+        /** @description How far steps are from a climatology. */
+        Anomalies: {
+            /** @description Years of the climatology. */
+            base: components["schemas"]["BasePeriod"];
+            /** @description Parts of the year of the climatology. */
+            bins: components["schemas"]["CalendarBins"];
+            /** @description One for each step in the order of time. */
+            rows: components["schemas"]["AnomalyRow"][];
+        };
+        /** @description A step beside the climatology. */
+        AnomalyRow: {
+            /**
+             * Format: double
+             * @description Value less normal.
+             */
+            anomaly: number | null;
+            /** @description First instant after it. */
+            end: components["schemas"]["TimeMs"];
+            /** @description The middle. */
+            mid: components["schemas"]["TimeMs"];
+            /**
+             * Format: double
+             * @description Mean of its part of the year; none where the base period has no data there.
+             */
+            normal: number | null;
+            /**
+             * Format: double
+             * @description The same in spreads of its part of the year; none where that is unknown or nothing.
+             */
+            standardised: number | null;
+            /** @description First instant that it covers. */
+            start: components["schemas"]["TimeMs"];
+            /**
+             * Format: double
+             * @description Value of the step; none without data.
+             */
+            value: number | null;
+        };
+        /**
          * @description What is seen beside the globe.
          * @enum {string}
          */
@@ -381,6 +514,11 @@ export interface components {
          * @enum {string}
          */
         BaseMap: "dark" | "light";
+        /**
+         * @description First and last year, both part of it.
+         * @example 1991/2020
+         */
+        BasePeriod: string;
         /** @description The carbon that a region gave off, with all that is needed to cite it. */
         BudgetAnswer: {
             /** @description How cells on the coast counted. */
@@ -478,6 +616,11 @@ export interface components {
          * @enum {string}
          */
         BudgetStep: "month" | "year" | "total";
+        /**
+         * @description What part of the year a step belongs to: by the middle of its period.
+         * @enum {string}
+         */
+        CalendarBins: "month" | "season" | "day";
         /** @description A cell of a product's grid. */
         Cell: {
             /**
@@ -560,6 +703,57 @@ export interface components {
             /** @description Region, and the figure of the earth where it is not WGS84. */
             what: string;
         };
+        /** @description What an answer is to be cited with. */
+        Cited: {
+            /** @description The version of the product that was read. */
+            manifest: string;
+            /** @description Product. */
+            product: components["schemas"]["ProductId"];
+            /** @description What the values are. */
+            quantity: components["schemas"]["Quantity"];
+            /** @description Citation of the product. */
+            source: string;
+            /** @description Made up by a program rather than measured. */
+            synthetic: boolean;
+            /** @description Title of the product. */
+            title: string;
+            /** @description Unit of the values, the one that people read. */
+            unit: string;
+        };
+        /** @description A climatology. Every step with data counts once; it belongs to the bin of its middle. */
+        Climatology: {
+            /** @description Years that it stands for. */
+            base: components["schemas"]["BasePeriod"];
+            /** @description Parts of the year. */
+            bins: components["schemas"]["CalendarBins"];
+            /** @description One for each part of the year, also where it holds no data. */
+            rows: components["schemas"]["ClimatologyRow"][];
+        };
+        /** @description What the steps of a part of the year have in common. */
+        ClimatologyRow: {
+            /** @description `January`, `December to February`, `29 February`. */
+            bin: string;
+            /**
+             * Format: int64
+             * @description Steps with data.
+             */
+            count: number;
+            /**
+             * Format: double
+             * @description Mean of its steps, in the answer's unit; none without data.
+             */
+            mean: number | null;
+            /**
+             * Format: double
+             * @description Standard deviation of its steps, divided by one less than their number; none of fewer than two.
+             */
+            spread: number | null;
+            /**
+             * Format: int64
+             * @description Years that have one.
+             */
+            years: number;
+        };
         /** @description How complete a row of accumulated carbon is: a cell with one month of twelve is not a complete one. */
         Completeness: {
             /**
@@ -573,11 +767,137 @@ export interface components {
              */
             incomplete_m2: number;
         };
+        /** @description How two series go together. */
+        Correlation: components["schemas"]["SeriesPlace"] & {
+            /** @description Was the mean of each calendar month taken off both first? */
+            deseasonalised: boolean;
+            /** @description First instant after it. */
+            end: components["schemas"]["TimeMs"];
+            /** @description The first product. */
+            first: components["schemas"]["Cited"];
+            /** @description What may surprise. */
+            notes: string[];
+            /** @description One for each lag, from the second leading to the first leading. */
+            rows: components["schemas"]["CorrelationRow"][];
+            /** @description The second product. */
+            second: components["schemas"]["Cited"];
+            /** @description First instant that both cover. */
+            start: components["schemas"]["TimeMs"];
+            /** @description What they are compared in. */
+            step: components["schemas"]["MeanStep"];
+            /**
+             * Format: int32
+             * @description The lag of the correlation that is furthest from none; none where no lag has any.
+             */
+            strongest_lag_steps: number | null;
+        };
+        /** @description The correlation at a lag. */
+        CorrelationRow: {
+            /**
+             * Format: double
+             * @description Pearson's; none with fewer than three pairs, or where one side does not vary.
+             */
+            correlation: number | null;
+            /**
+             * Format: int64
+             * @description Pairs of values.
+             */
+            count: number;
+            /**
+             * Format: double
+             * @description n (1 - r r') / (1 + r r') of n pairs, with each series' correlation with its next step where the product is above zero
+             *     (Bretherton et al. 1999, doi:10.1175/1520-0442(1999)012<1990:TENOSD>2.0.CO;2).
+             */
+            effective_count: number | null;
+            /**
+             * Format: int32
+             * @description Steps that the second is read after the first: above zero the first leads.
+             */
+            lag_steps: number;
+            /**
+             * Format: double
+             * @description Chance of one as far from none; Student's t with two less than the effective pairs. For this lag alone: of many
+             *     lags some pass by chance.
+             */
+            p_value: number | null;
+        };
+        /** @description A difference of two means over time. */
+        Difference: components["schemas"]["SeriesPlace"] & {
+            /**
+             * Format: double
+             * @description Mean of the first less mean of the second, in the answer's unit; none where one side has no data.
+             */
+            difference: number | null;
+            /** @description What is taken off. */
+            minus: components["schemas"]["DifferenceSide"];
+            /** @description What may surprise. */
+            notes: string[];
+            /** @description What something is taken off from. */
+            of: components["schemas"]["DifferenceSide"];
+            /**
+             * Format: double
+             * @description Chance of one as far from none (Welch 1947, doi:10.1093/biomet/34.1-2.28).
+             */
+            p_value: number | null;
+            /**
+             * Format: double
+             * @description One standard error, by the spread of each side's steps about its mean seasons and their effective number.
+             */
+            standard_error: number | null;
+            /** @description Unit of the means and of their difference. */
+            unit: string;
+        };
+        /** @description One of the two. */
+        DifferenceSide: components["schemas"]["Cited"] & {
+            /**
+             * Format: int64
+             * @description Steps with data.
+             */
+            count: number;
+            /**
+             * Format: double
+             * @description Effective number of steps.
+             */
+            effective_count: number | null;
+            /** @description First instant after it. */
+            end: components["schemas"]["TimeMs"];
+            /**
+             * Format: double
+             * @description Mean over time, each step by its length; none without data.
+             */
+            mean: number | null;
+            /** @description First instant that was read. */
+            start: components["schemas"]["TimeMs"];
+        };
         /**
          * @description Figure of the earth for areas.
          * @enum {string}
          */
         Earth: "wgs84" | "sphere" | "local-radius";
+        /** @description A step. */
+        Extreme: {
+            /** @description First instant after it. */
+            end: components["schemas"]["TimeMs"];
+            /** @description First instant that it covers. */
+            start: components["schemas"]["TimeMs"];
+            /**
+             * Format: double
+             * @description Its value, in the answer's unit.
+             */
+            value: number;
+        };
+        /** @description The ends of a series. */
+        Extremes: {
+            /** @description Highest first; of equal ones the earliest first. */
+            highest: components["schemas"]["Extreme"][];
+            /** @description Lowest first; of equal ones the earliest first. */
+            lowest: components["schemas"]["Extreme"][];
+            /**
+             * @description Between two values straight in rank: the p-th lies at p (n - 1) / 100 of n values from the lowest on, definition 7 of
+             *     Hyndman and Fan (1996), doi:10.1080/00031305.1996.10473566.
+             */
+            percentiles: components["schemas"]["Percentile"][];
+        };
         /** @description Places as longitude and latitude, degrees: the last one, or the track of a ship. */
         Geometry: {
             coordinates: [
@@ -593,6 +913,109 @@ export interface components {
             ][][];
             /** @enum {string} */
             type: "MultiLineString";
+        };
+        /** @description A wave. */
+        Harmonic: {
+            /**
+             * Format: double
+             * @description Half of what lies between its highest and its lowest value, in the answer's unit.
+             */
+            amplitude: number;
+            /**
+             * Format: double
+             * @description When it is highest for the first time in a year: days from its start, a year of 365.25 days counted from 2000-01-01.
+             */
+            highest_after_days: number;
+        };
+        /** @description Means of bands against time. */
+        Hovmoller: components["schemas"]["Cited"] & {
+            /** @description What bands lie along. */
+            along: components["schemas"]["Along"];
+            /**
+             * Format: double
+             * @description Height or width of a band, degrees.
+             */
+            band_deg: number;
+            /** @description Bands from the south or the west. */
+            bands: components["schemas"]["HovmollerBand"][];
+            /** @description West, south, east, north of the cells whose middles count. */
+            bounds_deg: number[];
+            /** @description Figure of the earth for areas. */
+            earth: components["schemas"]["Earth"];
+            /** @description One for each step in the order of time. */
+            rows: components["schemas"]["HovmollerRow"][];
+            /** @description What a row covers; of months and years each step counts by the time that lies in it. */
+            step: components["schemas"]["MeanStep"];
+        };
+        /** @description A band: cells whose middles lie in it, its lower edge included. */
+        HovmollerBand: {
+            /**
+             * Format: double
+             * @description Area of its cells that hold data in some step, m².
+             */
+            area_m2: number;
+            /**
+             * Format: double
+             * @description Its northern or eastern edge, degrees.
+             */
+            high_deg: number;
+            /**
+             * Format: double
+             * @description Its southern or western edge, degrees.
+             */
+            low_deg: number;
+        };
+        /** @description A step. */
+        HovmollerRow: {
+            /** @description Share of each band's area that holds data, percent. */
+            coverage_percent: number[];
+            /** @description First instant after it. */
+            end: components["schemas"]["TimeMs"];
+            /** @description Mean of each band over its cells with data, by area; none without any. */
+            means: (number | null)[];
+            /** @description First instant that it covers. */
+            start: components["schemas"]["TimeMs"];
+        };
+        /**
+         * @description A line by least squares, its uncertainty with an effective number of values: n (1 - r) / (1 + r), r the correlation of
+         *     residuals with their next ones where that is above zero (Santer et al. 2000, doi:10.1029/1999JD901105).
+         */
+        LeastSquaresTrend: {
+            /**
+             * Format: double
+             * @description Effective number of values.
+             */
+            effective_count: number;
+            /**
+             * Format: double
+             * @description Correlation of residuals with their next ones.
+             */
+            lag1_autocorrelation: number;
+            /**
+             * Format: double
+             * @description Lower end of the interval that holds it with 95 %.
+             */
+            lower_per_decade: number | null;
+            /**
+             * Format: double
+             * @description Chance of a slope as steep where there is none; Student's t with two less than the effective values.
+             */
+            p_value: number | null;
+            /**
+             * Format: double
+             * @description Change in ten years of 365.25 days.
+             */
+            slope_per_decade: number;
+            /**
+             * Format: double
+             * @description One standard error; none where too few values are effective.
+             */
+            standard_error_per_decade: number | null;
+            /**
+             * Format: double
+             * @description Upper end.
+             */
+            upper_per_decade: number | null;
         };
         /** @description What the colours of a layer mean, in the unit people read. Places lie between `low` (0) and `high` (1). */
         Legend: {
@@ -677,6 +1100,37 @@ export interface components {
             /** @description Unit that people read: that of series, means and legends. */
             unit: string;
         };
+        /**
+         * @description The test of Mann and Kendall, its variance corrected for autocorrelation (Hamed and Rao 1998,
+         *     doi:10.1016/S0022-1694(97)00125-X): over all lags at which the ranks of the detrended values are correlated beyond 95 % of chance.
+         */
+        MannKendall: {
+            /**
+             * Format: double
+             * @description Chance of as high a score in either direction where there is no trend.
+             */
+            p_value: number;
+            /**
+             * Format: int64
+             * @description Pairs that rise less pairs that fall.
+             */
+            score: number;
+            /**
+             * Format: double
+             * @description Score over the number of pairs, -1 to 1.
+             */
+            tau: number;
+            /**
+             * Format: double
+             * @description What the variance of the score was multiplied with; never below 1.
+             */
+            variance_correction: number;
+            /**
+             * Format: double
+             * @description Score in standard deviations.
+             */
+            z: number;
+        };
         /** @description Cells of a product that files gave a value for and that hold none. */
         MaskedSummary: {
             /**
@@ -701,6 +1155,11 @@ export interface components {
             /** @description Steps of files that landed before masked cells were counted. */
             uncounted_steps: number;
         };
+        /**
+         * @description Length of the means that values are gathered in first.
+         * @enum {string}
+         */
+        MeanStep: "native" | "month" | "year";
         /**
          * @description How a layer is drawn: a thematic map, particles as points, sprites or a volume with shadows, or trails of a flow.
          * @enum {string}
@@ -818,6 +1277,19 @@ export interface components {
             /** @description Can the server not do without it? */
             required: boolean;
         };
+        /** @description What a share of values lies below. */
+        Percentile: {
+            /**
+             * Format: double
+             * @description The share, percent.
+             */
+            percent: number;
+            /**
+             * Format: double
+             * @description The value, in the answer's unit.
+             */
+            value: number;
+        };
         /** @description A half-open period `[start, end)`. */
         Period: {
             /**
@@ -902,37 +1374,6 @@ export interface components {
             /** @enum {string} */
             type: "FeatureCollection";
         };
-        /** @description The series of a cell, with all that is needed to cite it. */
-        PointSeries: {
-            /** @description The cell that holds the place: the values are its mean, not those of the very place. */
-            cell: components["schemas"]["Cell"];
-            /**
-             * Format: double
-             * @description Asked latitude, degrees.
-             */
-            lat_deg: number;
-            /**
-             * Format: double
-             * @description Asked longitude, degrees, in [-180, 180).
-             */
-            lon_deg: number;
-            /** @description The version of the product that was read. */
-            manifest: string;
-            /** @description Product. */
-            product: components["schemas"]["ProductId"];
-            /** @description What the values are. */
-            quantity: components["schemas"]["Quantity"];
-            /** @description One value for each step, in the order of time. */
-            series: components["schemas"]["PointValue"][];
-            /** @description Citation of the product. */
-            source: string;
-            /** @description Made up by a program rather than measured. */
-            synthetic: boolean;
-            /** @description Title of the product. */
-            title: string;
-            /** @description Unit of the values, the one that people read. */
-            unit: string;
-        };
         /** @description The value of a step. */
         PointValue: {
             /** @description What a sum of accumulated carbon holds; none for other values, and where nobody can tell any more. */
@@ -1000,6 +1441,13 @@ export interface components {
             /** @description What failed, on which object, and what would be valid; one line for people. */
             error: string;
         };
+        /** @description What was asked for and cannot be said. */
+        Refused: {
+            /** @description What. */
+            part: components["schemas"]["AnalysisPart"];
+            /** @description Why. */
+            reason: string;
+        };
         /** @description A region with a name. */
         Region: {
             /** @description West, south, east, north, degrees; west greater than east crosses the date line. */
@@ -1013,43 +1461,6 @@ export interface components {
             name: string;
             /** @description For people. */
             title: string;
-        };
-        /** @description The mean of a product over a region, step by step, with all that is needed to cite it. */
-        RegionSeries: {
-            /** @description Figure of the earth for areas. */
-            earth: components["schemas"]["Earth"];
-            /** @description The version of the product that was read. */
-            manifest: string;
-            /** @description How the region was taken where that may surprise. */
-            notes: string[];
-            /**
-             * Format: double
-             * @description Area of the sea in it, m².
-             */
-            ocean_area_m2: number;
-            /** @description What says which part of a cell is sea. */
-            ocean_source: string;
-            /** @description Product. */
-            product: components["schemas"]["ProductId"];
-            /** @description What the values are. */
-            quantity: components["schemas"]["Quantity"];
-            /** @description The region by its name, or as `west,south,east,north`. */
-            region: string;
-            /**
-             * Format: double
-             * @description Area of the region, land included, m².
-             */
-            region_area_m2: number;
-            /** @description One mean for each step in the period, in the order of time. */
-            series: components["schemas"]["RegionValue"][];
-            /** @description Citation of the product. */
-            source: string;
-            /** @description Made up by a program rather than measured. */
-            synthetic: boolean;
-            /** @description Title of the product. */
-            title: string;
-            /** @description Unit of the means, the one that people read. */
-            unit: string;
         };
         /** @description The mean of a step over a region. */
         RegionValue: {
@@ -1080,10 +1491,85 @@ export interface components {
             regions: components["schemas"]["Region"][];
         };
         /**
+         * @description How the value at a point is made.
+         * @enum {string}
+         */
+        Sampling: "cell" | "bilinear";
+        /**
          * @description How values are spread over the colours.
          * @enum {string}
          */
         Scale: "linear" | "log";
+        /**
+         * @description Amplitude and phase of the year and the half-year, by least squares over steps of any length. A step is taken as the mean
+         *     over its period, so that long steps do not flatten the wave.
+         */
+        Season: {
+            /** @description The year. */
+            annual: components["schemas"]["Harmonic"];
+            /**
+             * Format: int64
+             * @description Steps with data.
+             */
+            count: number;
+            /**
+             * Format: double
+             * @description Share of the variance about the mean (or the line) that both waves explain, percent.
+             */
+            explained_percent: number;
+            /** @description Was a straight line in time fitted along? From two years on. */
+            has_trend: boolean;
+            /**
+             * Format: double
+             * @description Mean without the waves, in the answer's unit.
+             */
+            mean: number;
+            /**
+             * Format: double
+             * @description Standard deviation of what they leave.
+             */
+            residual_spread: number;
+            /** @description The half-year. */
+            semi_annual: components["schemas"]["Harmonic"];
+        };
+        /** @description What was made of a series, with all that is needed to cite it. Parts that were not asked for are absent. */
+        SeriesAnalysis: components["schemas"]["Cited"] & components["schemas"]["SeriesPlace"] & {
+            /** @description How far each step is from the climatology. */
+            anomaly?: components["schemas"]["Anomalies"];
+            /** @description Mean, spread and count of each part of the year. */
+            climatology?: components["schemas"]["Climatology"];
+            /** @description First instant after it. */
+            end: components["schemas"]["TimeMs"];
+            /** @description Highest, lowest, percentiles. */
+            extremes?: components["schemas"]["Extremes"];
+            /** @description What may surprise: how the region was taken, steps that cover little of it. */
+            notes: string[];
+            /** @description What was asked for and cannot be said, and why. */
+            refused: components["schemas"]["Refused"][];
+            /** @description Amplitude and phase. */
+            season?: components["schemas"]["Season"];
+            /** @description First instant that was read. */
+            start: components["schemas"]["TimeMs"];
+            /**
+             * Format: int64
+             * @description Steps that were read.
+             */
+            step_count: number;
+            /** @description Change with time. */
+            trend?: components["schemas"]["Trend"];
+            /**
+             * Format: int64
+             * @description Steps of them that hold data.
+             */
+            value_count: number;
+        };
+        /** @description What a series is of. */
+        SeriesPlace: {
+            /** @description The cell; none of a region. */
+            cell?: components["schemas"]["Cell"];
+            /** @description The region that it is the mean over; none of a cell. */
+            region?: string;
+        };
         /** @description A value as a paper prints it. */
         Stated: {
             /** @description Decimals that are printed. */
@@ -1099,6 +1585,98 @@ export interface components {
              */
             value: number;
         };
+        /** @description A statistic of an answer. */
+        StatisticNote: {
+            /** @description Name that it has in rows. */
+            name: string;
+            /** @description Unit of its numbers. */
+            unit: string;
+            /** @description What it is, in a line. */
+            what: string;
+        };
+        /** @description Statistics of a product over a geometry, with all that is needed to cite them. */
+        StatisticsAnswer: {
+            /** @description How cells on the coast counted. */
+            cells: components["schemas"]["Cells"];
+            /** @description What coverage is a share of. */
+            coverage_basis: string;
+            /** @description Figure of the earth. */
+            earth: components["schemas"]["Earth"];
+            /** @description The geometry by its name, or as it was asked for. */
+            geometry: string;
+            /** @description `point`, `line` or `area`. */
+            kind: string;
+            /** @description The version of the product that was read. */
+            manifest: string;
+            /**
+             * Format: double
+             * @description Rows whose coverage is below this have no values, percent.
+             */
+            min_coverage_percent: number;
+            /** @description How the geometry was taken where that may surprise. */
+            notes: string[];
+            /** @description What says which part of a cell is sea; none for points and lines. */
+            ocean_source: string | null;
+            /** @description Product. */
+            product: components["schemas"]["ProductId"];
+            /** @description What the values are. */
+            quantity: components["schemas"]["Quantity"];
+            /** @description Rows in the order of time, one for every bin of the period, also where it holds nothing. */
+            rows: components["schemas"]["StatisticsRow"][];
+            /**
+             * Format: double
+             * @description How large the geometry is, wherever the grid lies: area in m², length in m; 1 for a point.
+             */
+            size: number;
+            /** @description Unit of `size`: `m²`, `m` or `1`. */
+            size_unit: string;
+            /** @description Citation of the product. */
+            source: string;
+            /** @description Each statistic with its unit and what it means. */
+            statistics: components["schemas"]["StatisticNote"][];
+            /** @description What a row covers. */
+            step: components["schemas"]["StatisticsStep"];
+            /** @description Made up by a program rather than measured. */
+            synthetic: boolean;
+            /** @description Title of the product. */
+            title: string;
+            /** @description Unit of the product's values, the one that people read. */
+            unit: string;
+        };
+        /** @description Statistics of one bin of time. */
+        StatisticsRow: {
+            /**
+             * Format: double
+             * @description Share of the geometry and of the row's time that holds data, percent.
+             */
+            coverage_percent: number;
+            /** @description First instant after it. */
+            end: components["schemas"]["TimeMs"];
+            /** @description Middle of the step that an extreme was found in, the first if there are several. */
+            found_at?: {
+                [key: string]: components["schemas"]["TimeMs"];
+            };
+            /** @description There are data, but less than the least coverage: its values are withheld. */
+            is_withheld: boolean;
+            /** @description The middle. */
+            mid: components["schemas"]["TimeMs"];
+            /** @description First instant. */
+            start: components["schemas"]["TimeMs"];
+            /**
+             * Format: int32
+             * @description Steps of the product that reach into the row.
+             */
+            step_count: number;
+            /** @description By the statistic's name, in its unit; null where nothing holds data, or too little does. */
+            values: {
+                [key: string]: number | null;
+            };
+        };
+        /**
+         * @description What one row of statistics covers.
+         * @enum {string}
+         */
+        StatisticsStep: "native" | "day" | "week" | "month" | "season" | "year" | "total";
         /** @description When a step holds. */
         StepTimes: {
             /** @description First instant after it. */
@@ -1107,6 +1685,32 @@ export interface components {
             mid: components["schemas"]["TimeMs"];
             /** @description First instant. */
             start: components["schemas"]["TimeMs"];
+        };
+        /**
+         * @description The median of the slopes of all pairs of values, exact (Theil 1950; Sen 1968, doi:10.1080/01621459.1968.10480934), and
+         *     Sen's interval with the variance that allows for autocorrelation.
+         */
+        TheilSenTrend: {
+            /**
+             * Format: double
+             * @description Median of the values less the slope times the time from `mid`: what the line holds there.
+             */
+            at_mid: number;
+            /**
+             * Format: double
+             * @description Lower end of the interval that holds it with 95 %.
+             */
+            lower_per_decade: number;
+            /**
+             * Format: double
+             * @description Change in ten years of 365.25 days.
+             */
+            slope_per_decade: number;
+            /**
+             * Format: double
+             * @description Upper end.
+             */
+            upper_per_decade: number;
         };
         /** @description TileJSON 3.0.0, and beyond it the version and the instants of the layer. */
         TileJson: {
@@ -1156,6 +1760,55 @@ export interface components {
          * @description An instant, ISO 8601 UTC.
          */
         TimeMs: string;
+        /**
+         * @description Trends of a series. Where steps are shorter than a year, the mean of each calendar month is taken off first, so that a
+         *     season that begins or ends early is no trend.
+         */
+        Trend: {
+            /**
+             * Format: int64
+             * @description Number of values.
+             */
+            count: number;
+            /** @description Was the mean of each calendar month taken off first? */
+            deseasonalised: boolean;
+            /** @description By least squares. */
+            least_squares: components["schemas"]["LeastSquaresTrend"];
+            /** @description Is there a trend in either direction? */
+            mann_kendall: components["schemas"]["MannKendall"];
+            /**
+             * Format: double
+             * @description Mean of the values, in the answer's unit, season included.
+             */
+            mean: number;
+            /** @description Where the lines hold their middle: the mean instant of the values. */
+            mid: components["schemas"]["TimeMs"];
+            /** @description Unit of every slope. */
+            slope_unit: string;
+            /** @description Means that it is drawn through; of months and years those that hold data over half of their time. */
+            step: components["schemas"]["MeanStep"];
+            /** @description By the median of the slopes of all pairs. */
+            theil_sen: components["schemas"]["TheilSenTrend"];
+            /** @description What the lines are drawn through, seasons taken off about the mean where they are; steps without data are absent. */
+            values: components["schemas"]["TrendValue"][];
+            /**
+             * Format: double
+             * @description From the first to the last value, years of 365.25 days.
+             */
+            years: number;
+        };
+        /** @description A value that a trend is drawn through. */
+        TrendValue: {
+            /** @description First instant after it. */
+            end: components["schemas"]["TimeMs"];
+            /** @description First instant that it covers. */
+            start: components["schemas"]["TimeMs"];
+            /**
+             * Format: double
+             * @description In the answer's unit.
+             */
+            value: number;
+        };
         /**
          * @description What a paper's own uncertainty says of a difference.
          * @enum {string}
@@ -1631,11 +2284,23 @@ export interface operations {
             };
         };
     };
-    area: {
+    analysis: {
         parameters: {
             query: {
+                /** @description What is made of the series: `climatology`, `anomaly`, `trend`, `season`, `extremes`, several with commas. */
+                parts: string;
+                /** @description Years of the climatology, both part of it: `1991/2020`; all that are covered unless given. */
+                base?: string;
+                /** @description Parts of the year of the climatology: `month` (the default), `season` or `day`. */
+                bins?: string;
+                /** @description Means that the trend is drawn through: `month` (the default), `year` or `native`. */
+                trend_step?: string;
+                /** @description Longitude of a cell, degrees east, -180 to 360; with `lat`, in place of a region. */
+                lon?: number;
+                /** @description Latitude of a cell, degrees north. */
+                lat?: number;
                 /** @description `global`, a name that `/api/regions` lists, `west,south,east,north` in degrees, GeoJSON or well-known text. */
-                region: string;
+                region?: string;
                 /** @description First instant, ISO 8601 UTC; the product's own unless one is given. */
                 from?: string;
                 /** @description First instant after the period; the product's own unless one is given. */
@@ -1656,13 +2321,144 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description One mean for each step */
+            /** @description What was asked for, each part by itself */
             200: {
                 headers: {
                     [name: string]: unknown;
                 };
                 content: {
-                    "application/json": components["schemas"]["RegionSeries"];
+                    "application/json": components["schemas"]["SeriesAnalysis"];
+                };
+            };
+            /** @description A parameter is not valid, or missing; the reason says what would be */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description Nothing of that name; the reason says where names are listed */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description A defect of this server */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description Too much to do, or a part that is needed does not answer */
+            503: {
+                headers: {
+                    /** @description Seconds after which the same request may succeed */
+                    "retry-after"?: number;
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description The answer took too long */
+            504: {
+                headers: {
+                    /** @description Seconds after which the same request may succeed */
+                    "retry-after"?: number;
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+        };
+    };
+    area: {
+        parameters: {
+            query: {
+                /** @description `global`, a name that `/api/regions` lists, `west,south,east,north` in degrees, GeoJSON or well-known text. */
+                region: string;
+                /** @description First instant, ISO 8601 UTC; the product's own unless one is given. */
+                from?: string;
+                /** @description First instant after the period; the product's own unless one is given. */
+                to?: string;
+                /** @description Figure of the earth for areas; `wgs84` unless one is given. */
+                earth?: components["schemas"]["Earth"];
+                /** @description Landed product whose cells say how much of them is sea or land, in place of Natural Earth. */
+                ocean?: string;
+                /**
+                 * @description Statistics, separated by commas: `mean`, `sum`, `min`, `max`, `std`, `median`, `count`, `coverage`, and percentiles such
+                 *     as `p90`. With this, `step` or `min_coverage` the answer is a `StatisticsAnswer`.
+                 */
+                statistic?: string;
+                /** @description What a row of statistics covers; `native` unless told otherwise. */
+                step?: components["schemas"]["StatisticsStep"];
+                /** @description Least coverage, percent: rows of statistics with less have no values; 0 unless told otherwise. */
+                min_coverage?: number;
+                /** @description How cells on the coast count in statistics; `whole` unless told otherwise. */
+                cells?: components["schemas"]["Cells"];
+                /** @description Version, as answers name it; the newest unless one is given. */
+                manifest?: string;
+            };
+            header?: never;
+            path: {
+                /** @description Name of the product */
+                product: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description One mean for each step; statistics where they are asked for */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": {
+                        /** @description Figure of the earth for areas. */
+                        earth: components["schemas"]["Earth"];
+                        /** @description The version of the product that was read. */
+                        manifest: string;
+                        /** @description How the region was taken where that may surprise. */
+                        notes: string[];
+                        /**
+                         * Format: double
+                         * @description Area of the sea in it, m².
+                         */
+                        ocean_area_m2: number;
+                        /** @description What says which part of a cell is sea. */
+                        ocean_source: string;
+                        /** @description Product. */
+                        product: components["schemas"]["ProductId"];
+                        /** @description What the values are. */
+                        quantity: components["schemas"]["Quantity"];
+                        /** @description The region by its name, or as `west,south,east,north`. */
+                        region: string;
+                        /**
+                         * Format: double
+                         * @description Area of the region, land included, m².
+                         */
+                        region_area_m2: number;
+                        /** @description One mean for each step in the period, in the order of time. */
+                        series: components["schemas"]["RegionValue"][];
+                        /** @description Citation of the product. */
+                        source: string;
+                        /** @description Made up by a program rather than measured. */
+                        synthetic: boolean;
+                        /** @description Title of the product. */
+                        title: string;
+                        /** @description Unit of the means, the one that people read. */
+                        unit: string;
+                    } | components["schemas"]["StatisticsAnswer"];
                 };
             };
             /** @description A parameter is not valid, or missing; the reason says what would be */
@@ -1755,6 +2551,286 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["BudgetAnswer"];
+                };
+            };
+            /** @description A parameter is not valid, or missing; the reason says what would be */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description Nothing of that name; the reason says where names are listed */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description A defect of this server */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description Too much to do, or a part that is needed does not answer */
+            503: {
+                headers: {
+                    /** @description Seconds after which the same request may succeed */
+                    "retry-after"?: number;
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description The answer took too long */
+            504: {
+                headers: {
+                    /** @description Seconds after which the same request may succeed */
+                    "retry-after"?: number;
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+        };
+    };
+    correlation: {
+        parameters: {
+            query: {
+                /** @description The second product. */
+                with: string;
+                /** @description Most steps that one is moved against the other, 0 (the default) to 400. */
+                max_lag?: number;
+                /** @description What they are compared in: `month` (the default), `year` or `native`, for which both need the same periods. */
+                step?: string;
+                /** @description `true`: the mean of each calendar month is taken off both first. */
+                deseasonalise?: boolean;
+                /** @description Longitude of a cell, degrees east, -180 to 360; with `lat`, in place of a region. */
+                lon?: number;
+                /** @description Latitude of a cell, degrees north. */
+                lat?: number;
+                /** @description `global`, a name that `/api/regions` lists, `west,south,east,north` in degrees, GeoJSON or well-known text. */
+                region?: string;
+                /** @description First instant, ISO 8601 UTC; the products' own unless one is given. */
+                from?: string;
+                /** @description First instant after the period; the products' own unless one is given. */
+                to?: string;
+                /** @description Figure of the earth for areas; `wgs84` unless one is given. */
+                earth?: components["schemas"]["Earth"];
+                /** @description Version, as answers name it; the newest unless one is given. */
+                manifest?: string;
+                /** @description Version of the second product; the newest unless one is given. */
+                with_manifest?: string;
+            };
+            header?: never;
+            path: {
+                /** @description Name of the first product */
+                product: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description One row for each lag */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Correlation"];
+                };
+            };
+            /** @description A parameter is not valid, or missing; the reason says what would be */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description Nothing of that name; the reason says where names are listed */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description A defect of this server */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description Too much to do, or a part that is needed does not answer */
+            503: {
+                headers: {
+                    /** @description Seconds after which the same request may succeed */
+                    "retry-after"?: number;
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description The answer took too long */
+            504: {
+                headers: {
+                    /** @description Seconds after which the same request may succeed */
+                    "retry-after"?: number;
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+        };
+    };
+    difference: {
+        parameters: {
+            query?: {
+                /** @description Years, both part of it: `2001/2005`; all that are covered unless given. */
+                period?: string;
+                /** @description Version, as answers name it; the newest unless one is given. */
+                manifest?: string;
+                /** @description Product that is taken off; the same one unless given. */
+                minus?: string;
+                /** @description Its years; the same ones unless given. */
+                minus_period?: string;
+                /** @description Its version; the newest unless one is given. */
+                minus_manifest?: string;
+                /** @description Longitude of a cell, degrees east, -180 to 360; with `lat`, in place of a region. */
+                lon?: number;
+                /** @description Latitude of a cell, degrees north. */
+                lat?: number;
+                /** @description `global`, a name that `/api/regions` lists, `west,south,east,north` in degrees, GeoJSON or well-known text. */
+                region?: string;
+                /** @description Figure of the earth for areas; `wgs84` unless one is given. */
+                earth?: components["schemas"]["Earth"];
+            };
+            header?: never;
+            path: {
+                /** @description Name of the product */
+                product: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Both means and their difference */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Difference"];
+                };
+            };
+            /** @description A parameter is not valid, or missing; the reason says what would be */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description Nothing of that name; the reason says where names are listed */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description A defect of this server */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description Too much to do, or a part that is needed does not answer */
+            503: {
+                headers: {
+                    /** @description Seconds after which the same request may succeed */
+                    "retry-after"?: number;
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description The answer took too long */
+            504: {
+                headers: {
+                    /** @description Seconds after which the same request may succeed */
+                    "retry-after"?: number;
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+        };
+    };
+    hovmoller: {
+        parameters: {
+            query: {
+                /** @description What bands lie along: `lat` or `lon`. */
+                along: components["schemas"]["Along"];
+                /** @description Height or width of a band, degrees; the least of 1, 2, 5, 10 that is no less than a cell unless given. */
+                band?: number;
+                /** @description What a row covers: `month` (the default), `year` or `native`. */
+                step?: string;
+                /**
+                 * @description `global`, a named region that is a box, or `west,south,east,north` in degrees: cells whose middles lie in it; all of
+                 *     the grid unless given.
+                 */
+                region?: string;
+                /** @description First instant, ISO 8601 UTC; the product's own unless one is given. */
+                from?: string;
+                /** @description First instant after the period; the product's own unless one is given. */
+                to?: string;
+                /** @description Figure of the earth for areas; `wgs84` unless one is given. */
+                earth?: components["schemas"]["Earth"];
+                /** @description Version, as answers name it; the newest unless one is given. */
+                manifest?: string;
+            };
+            header?: never;
+            path: {
+                /** @description Name of the product */
+                product: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description One row for each step, one mean in it for each band */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Hovmoller"];
                 };
             };
             /** @description A parameter is not valid, or missing; the reason says what would be */
@@ -1926,13 +3002,26 @@ export interface operations {
             };
         };
     };
-    point: {
+    line: {
         parameters: {
             query: {
-                /** @description Longitude, degrees east, -180 to 360. */
-                lon: number;
-                /** @description Latitude, degrees north. */
-                lat: number;
+                /** @description `LON,LAT;LON,LAT;...` in degrees, GeoJSON or well-known text; a great circle from each vertex to the next. */
+                line: string;
+                /**
+                 * @description Statistics, separated by commas: `mean`, `sum`, `min`, `max`, `std`, `median`, `count`, `coverage`, and percentiles such
+                 *     as `p90`; `mean` unless told otherwise.
+                 */
+                statistic?: string;
+                /** @description What a row covers; `native` unless told otherwise. */
+                step?: components["schemas"]["StatisticsStep"];
+                /** @description First instant, ISO 8601 UTC; the product's own unless one is given. */
+                from?: string;
+                /** @description First instant after the period; the product's own unless one is given. */
+                to?: string;
+                /** @description Least coverage, percent: rows with less have no values; 0 unless told otherwise. */
+                min_coverage?: number;
+                /** @description Figure of the earth for lengths; `wgs84` unless one is given. */
+                earth?: components["schemas"]["Earth"];
                 /** @description Version, as answers name it; the newest unless one is given. */
                 manifest?: string;
             };
@@ -1945,13 +3034,136 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description One value for each step */
+            /** @description One row for each bin of time */
             200: {
                 headers: {
                     [name: string]: unknown;
                 };
                 content: {
-                    "application/json": components["schemas"]["PointSeries"];
+                    "application/json": components["schemas"]["StatisticsAnswer"];
+                };
+            };
+            /** @description A parameter is not valid, or missing; the reason says what would be */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description Nothing of that name; the reason says where names are listed */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description A defect of this server */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description Too much to do, or a part that is needed does not answer */
+            503: {
+                headers: {
+                    /** @description Seconds after which the same request may succeed */
+                    "retry-after"?: number;
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description The answer took too long */
+            504: {
+                headers: {
+                    /** @description Seconds after which the same request may succeed */
+                    "retry-after"?: number;
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+        };
+    };
+    point: {
+        parameters: {
+            query: {
+                /** @description Longitude, degrees east, -180 to 360. */
+                lon: number;
+                /** @description Latitude, degrees north. */
+                lat: number;
+                /**
+                 * @description Statistics, separated by commas: `mean`, `sum`, `min`, `max`, `std`, `median`, `count`, `coverage`, and percentiles such
+                 *     as `p90`. With this, `step`, `min_coverage`, `from`, `to` or `sampling` the answer is a `StatisticsAnswer`.
+                 */
+                statistic?: string;
+                /** @description What a row of statistics covers; `native` unless told otherwise. */
+                step?: components["schemas"]["StatisticsStep"];
+                /** @description Least coverage, percent: rows of statistics with less have no values; 0 unless told otherwise. */
+                min_coverage?: number;
+                /** @description First instant of statistics, ISO 8601 UTC; the product's own unless one is given. */
+                from?: string;
+                /** @description First instant after the period; the product's own unless one is given. */
+                to?: string;
+                /** @description What the value at the place is: that of its cell, or bilinear of the four around it; `cell` unless told otherwise. */
+                sampling?: components["schemas"]["Sampling"];
+                /** @description Version, as answers name it; the newest unless one is given. */
+                manifest?: string;
+            };
+            header?: never;
+            path: {
+                /** @description Name of the product */
+                product: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description One value for each step; statistics where they are asked for */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": {
+                        /** @description The cell that holds the place: the values are its mean, not those of the very place. */
+                        cell: components["schemas"]["Cell"];
+                        /**
+                         * Format: double
+                         * @description Asked latitude, degrees.
+                         */
+                        lat_deg: number;
+                        /**
+                         * Format: double
+                         * @description Asked longitude, degrees, in [-180, 180).
+                         */
+                        lon_deg: number;
+                        /** @description The version of the product that was read. */
+                        manifest: string;
+                        /** @description Product. */
+                        product: components["schemas"]["ProductId"];
+                        /** @description What the values are. */
+                        quantity: components["schemas"]["Quantity"];
+                        /** @description One value for each step, in the order of time. */
+                        series: components["schemas"]["PointValue"][];
+                        /** @description Citation of the product. */
+                        source: string;
+                        /** @description Made up by a program rather than measured. */
+                        synthetic: boolean;
+                        /** @description Title of the product. */
+                        title: string;
+                        /** @description Unit of the values, the one that people read. */
+                        unit: string;
+                    } | components["schemas"]["StatisticsAnswer"];
                 };
             };
             /** @description A parameter is not valid, or missing; the reason says what would be */
@@ -2920,9 +4132,12 @@ type ReadonlyArray<T> = [
 ] extends [
     unknown[]
 ] ? Readonly<Exclude<T, undefined>> : Readonly<Exclude<T, undefined>[]>;
+export const alongValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["Along"]> = ["lat", "lon"];
+export const analysisPartValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["AnalysisPart"]> = ["climatology", "anomaly", "trend", "season", "extremes"];
 export const backgroundValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["Background"]> = ["none", "sky"];
 export const baseMapValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["BaseMap"]> = ["dark", "light"];
 export const budgetStepValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["BudgetStep"]> = ["month", "year", "total"];
+export const calendarBinsValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["CalendarBins"]> = ["month", "season", "day"];
 export const cellsValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["Cells"]> = ["whole", "ocean-share"];
 export const earthValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["Earth"]> = ["wgs84", "sphere", "local-radius"];
 export const geometryOneOf0TypeValues: ReadonlyArray<Extract<FlattenedDeepRequired<components>["schemas"]["Geometry"], {
@@ -2932,6 +4147,7 @@ export const geometryOneOf1TypeValues: ReadonlyArray<Extract<FlattenedDeepRequir
     type: unknown;
 }>["type"]> = ["MultiLineString"];
 export const legendFormValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["LegendForm"]> = ["json", "svg", "png"];
+export const meanStepValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["MeanStep"]> = ["native", "month", "year"];
 export const modeValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["Mode"]> = ["map", "points", "sprites", "volume", "flow"];
 export const paletteValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["Palette"]> = ["balance", "curl", "delta", "thermal", "haline", "ice", "algae", "speed", "dense", "gray"];
 export const platformFeatureTypeValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["PlatformFeature"]["type"]> = ["Feature"];
@@ -2939,5 +4155,7 @@ export const platformKindValues: ReadonlyArray<FlattenedDeepRequired<components>
 export const platformsTypeValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["Platforms"]["type"]> = ["FeatureCollection"];
 export const qualityValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["Quality"]> = ["good", "not_evaluated", "questionable", "bad"];
 export const quantityOneOf0Values: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["Quantity"]> = ["carbon_flux", "accumulated_carbon", "sea_surface_temperature", "sea_surface_skin_temperature", "sea_surface_subskin_temperature", "sea_surface_foundation_temperature", "chlorophyll", "wind_speed", "pco2", "fco2", "salinity", "air_pressure", "ice_fraction", "wave_height", "precipitation", "current", "elevation", "sea_area_fraction", "land_area_fraction"];
+export const samplingValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["Sampling"]> = ["cell", "bilinear"];
 export const scaleValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["Scale"]> = ["linear", "log"];
+export const statisticsStepValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["StatisticsStep"]> = ["native", "day", "week", "month", "season", "year", "total"];
 export const verdictValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["Verdict"]> = ["within", "outside", "no_uncertainty_stated"];
