@@ -178,10 +178,21 @@ async fn what_is_derived_now_is_named_as_in_the_newest_frozen_store() {
         now.remove(&key).await.unwrap();
     }
     write(&now).await;
-    assert_eq!(own(&kept).await, own(&now).await);
+    let mut frozen = own(&kept).await;
+    // Values along time lie in cubes now; what was frozen has a series of its own.
+    frozen.retain(|key| Kind::of(key) != Some(Kind::Series));
+    assert_eq!(frozen, own(&now).await);
     for key in own(&kept).await {
         if matches!(Kind::of(&key), Some(Kind::Manifest | Kind::Sums)) {
-            assert_eq!(kept.get(&key).await.unwrap(), now.get(&key).await.unwrap());
+            let of = async |store: &Store| -> serde_json::Value {
+                let content = store.get(&key).await.unwrap();
+                let mut document: serde_json::Value = serde_json::from_slice(&content).unwrap();
+                if let Some(series) = document.get_mut("series") {
+                    *series = serde_json::json!([]);
+                }
+                document
+            };
+            assert_eq!(of(&kept).await, of(&now).await);
         }
     }
 }

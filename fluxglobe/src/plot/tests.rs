@@ -50,13 +50,13 @@ fn a_climatology_is_a_line_of_means_in_a_band_of_spreads() {
     let svg = of_analysis(&analysis("climatology", made)).unwrap();
     is_told(&svg);
     assert!(svg.contains("2001/2010") && svg.contains("Jan") && svg.contains("Dec"));
-    // One month has no data: two bands, and eleven dots.
+    // One month has no data and one no spread: three bands, and eleven dots.
     assert_eq!(
         (
             svg.matches("<polygon").count(),
             svg.matches("<circle").count()
         ),
-        (2, 11)
+        (3, 11)
     );
 }
 

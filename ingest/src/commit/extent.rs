@@ -7,7 +7,7 @@ use contract::key::ObjectKey;
 use contract::manifest::{Manifest, Step};
 use contract::product::ProductId;
 use futures::stream::{self, StreamExt as _, TryStreamExt as _};
-use storage::{Store, domain, fields};
+use storage::{StorageError, Store, domain, fields};
 
 use crate::error::IngestError;
 
@@ -38,11 +38,18 @@ pub(super) async fn write(
     let mut cells = before.clone();
     let mut lost = vec![false; cells.len()];
     let gone = fields_but(there, &next);
-    each(store, grid, gone, |values| {
+    let seen = each(store, grid, gone, |values| {
         mark(&mut lost, values);
         true
-    })
-    .await?;
+    });
+    match seen.await {
+        // What is damaged may have held a value anywhere; it is on its way out, and must not keep what replaces it from landing.
+        Err(IngestError::Storage {
+            source: StorageError::Damaged { .. },
+            ..
+        }) => lost.copy_from_slice(&before),
+        other => other?,
+    }
     let come = fields_but(steps, &own);
     each(store, grid, come, |values| {
         mark(&mut cells, values);

@@ -27,7 +27,7 @@ export async function check(): Promise<Check | undefined> {
 }
 
 export function point(product: string, lon: number, lat: number, signal: AbortSignal): Promise<PointSeries> {
-  return getJson<Answer<"point">>(pointUrl(product, lon, lat), signal);
+  return getJson<PointSeries>(pointUrl(product, lon, lat), signal);
 }
 
 export function pointUrl(product: string, lon: number, lat: number): string {

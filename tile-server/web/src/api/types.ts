@@ -9,7 +9,8 @@ export type Palette = Schemas["PaletteColours"];
 export type Product = Schemas["Product"];
 export type TileJson = Schemas["TileJson"];
 export type StepTimes = Schemas["StepTimes"];
-export type PointSeries = Schemas["PointSeries"];
+/** The series of a cell; statistics, which the same address gives, are not asked for. */
+export type PointSeries = Extract<Answer<"point">, { series: unknown }>;
 export type Cells = Schemas["Cells"];
 export type Earth = Schemas["Earth"];
 export type Budget = Schemas["BudgetAnswer"];
