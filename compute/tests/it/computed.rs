@@ -207,7 +207,7 @@ async fn asked_again_it_is_there_and_after_a_revision_the_other_steps_are_kept()
     for (index, step) in wind.steps.iter().enumerate() {
         let mut values = values(&store, &wind, index).await;
         if index == 4 {
-            for value in values.iter_mut() {
+            for value in &mut values {
                 *value += 1.0;
             }
         }
