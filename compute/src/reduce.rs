@@ -1,7 +1,7 @@
 //! One reduction: a version of a product, weights of a geometry on its grid, and bins of time in; statistics out.
 //!
 //! Tasks of a run of blocks and a run of steps each read their own values and give back accumulators, which are integers
-//! and extremes: merged in any order they have the same bits (docs/decisions/023-one-reduction.md). Values leave no task.
+//! and extremes: merged in any order they have the same bits (docs/decisions/024-one-reduction.md). Values leave no task.
 
 pub(crate) mod accumulator;
 mod answer;
