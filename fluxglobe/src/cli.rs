@@ -463,7 +463,7 @@ pub(crate) struct Camera {
 /// `fluxglobe generate`.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Generate {
-    /// Synthetic CO2 flux of the China Sea, 2009, by months or days: 1800 x 2460 cells of 1/60 degree, HDF5.
+    /// Synthetic CO2 flux of the China Sea, by months or days of 2009 or by days of many years: 1800 x 2460 cells of 1/60 degree, HDF5.
     ChinaSea {
         /// Share of the full size along each side, 0.01 to 1.
         #[arg(long, default_value_t = 1.0)]
@@ -474,6 +474,9 @@ pub(crate) enum Generate {
         /// So many days from the start of 2009, 1 to 365, instead of its months.
         #[arg(long, value_parser = clap::value_parser!(u16).range(1..=365))]
         days: Option<u16>,
+        /// So many years of days from 2009 on, 1 to 92, a file a year: `--output` with the year before its ending.
+        #[arg(long, value_parser = clap::value_parser!(u16).range(1..=92), conflicts_with = "days")]
+        years: Option<u16>,
         /// File to write.
         #[arg(short, long, default_value = "china-sea-synthetic.h5")]
         output: PathBuf,

@@ -20,7 +20,11 @@ const WEST_DEG: f64 = 100.0;
 const HEIGHT_DEG: f64 = 41.0;
 const WIDTH_DEG: f64 = 30.0;
 /// The year of the twelve months.
-const YEAR: i32 = 2009;
+const YEAR: u16 = 2009;
+/// Months of a year.
+const MONTHS: usize = 12;
+/// The last year that can be made up.
+const LAST_YEAR: u16 = 2100;
 /// What stands for no data in the file.
 const FILL: f32 = -9999.0;
 /// Share of the sea under cloud, averaged over the year.
@@ -68,6 +72,8 @@ pub enum GeneratedSteps {
     Months,
     /// So many days from the start of 2009, 1 to 365: the month's map, stronger and weaker over nine days.
     Days(u16),
+    /// All days of a year from 2009 on, 2009 as above; eddies and clouds of other years are others.
+    Year(u16),
 }
 
 impl GeneratedSteps {
@@ -76,19 +82,36 @@ impl GeneratedSteps {
         match self {
             Self::Months => (0..=12).map(writer::first_day).collect(),
             Self::Days(count) => (0..=count).map(f64::from).collect(),
+            Self::Year(year) => {
+                let month = MONTHS * usize::from(year.saturating_sub(YEAR));
+                let [start, end] = [month, month + MONTHS].map(|at| writer::first_day(at) as u32);
+                (start..=end).map(f64::from).collect()
+            }
         }
     }
 
-    /// The month that a step lies in, and by how much its flux is multiplied.
+    /// The month that a step lies in, counted from January 2009, and by how much its flux is multiplied.
     fn month_and_strength(self, step: usize) -> (usize, f32) {
-        match self {
-            Self::Months => (step, 1.0),
-            Self::Days(_) => {
-                let is_begun = |month: &usize| writer::first_day(*month) <= step as f64;
-                let month = (0..12).rev().find(is_begun).unwrap_or(0);
-                let phase = step as f64 / 9.0 * std::f64::consts::TAU;
-                (month, (1.0 + 0.25 * phase.sin()) as f32)
+        let (day, first_month) = match self {
+            Self::Months => return (step, 1.0),
+            Self::Days(_) => (step as f64, 0),
+            Self::Year(year) => {
+                let month = MONTHS * usize::from(year.saturating_sub(YEAR));
+                (writer::first_day(month) + step as f64, month)
             }
+        };
+        let is_begun = |month: &usize| writer::first_day(first_month + *month) <= day;
+        let month = (0..MONTHS).rev().find(is_begun).unwrap_or(0);
+        let phase = day / 9.0 * std::f64::consts::TAU;
+        (first_month + month, (1.0 + 0.25 * phase.sin()) as f32)
+    }
+
+    /// What a title says of the time that is covered.
+    fn title(self) -> &'static str {
+        match self {
+            Self::Months | Self::Days(_) => " 2009",
+            // Files of several years make one product.
+            Self::Year(_) => "",
         }
     }
 }
@@ -115,13 +138,19 @@ pub fn generate_china_sea(
         .collect();
     // A reader never sees half a file.
     let part = path.with_extension("part");
+    match steps {
+        GeneratedSteps::Days(count) if !(1..=365).contains(&count) => {
+            return Err(failed(format!("{count} days are not 1 to 365")));
+        }
+        GeneratedSteps::Year(year) if !(YEAR..=LAST_YEAR).contains(&year) => {
+            return Err(failed(format!("{year} is not {YEAR} to {LAST_YEAR}")));
+        }
+        _ => {}
+    }
     let edges = steps.edges();
     let step_count = edges.len() - 1;
-    if !(1..=365).contains(&step_count) {
-        return Err(failed(format!("{step_count} days are not 1 to 365")));
-    }
     let mut last: Option<(usize, Vec<f32>)> = None;
-    let written = writer::write(&part, shape, seed, &edges, |step| {
+    let written = writer::write(&part, shape, (seed, steps.title()), &edges, |step| {
         progress(step, step_count);
         let (month, strength) = steps.month_and_strength(step);
         let map = match last.take() {
@@ -145,7 +174,7 @@ pub fn generate_china_sea(
     Ok(())
 }
 
-/// Flux of one month (0 to 11), mmol m⁻² d⁻¹, positive out of the sea, `[row, col]` from the south; land and cloud filled.
+/// Flux of one month (0 for January 2009), mmol m⁻² d⁻¹, positive out of the sea, `[row, col]` from the south; land and cloud filled.
 fn month_values(shape: Shape, is_sea: &[bool], month: usize, noise: Noise) -> Vec<f32> {
     let cloud: Vec<f32> = shape
         .centers()
@@ -211,10 +240,19 @@ mod tests {
             GeneratedSteps::Months.edges()[12].to_bits(),
             365.0f64.to_bits()
         );
+        let leap = GeneratedSteps::Year(2012);
+        let edges = leap.edges();
+        assert_eq!((edges.len(), edges[0] as u32), (367, 3 * 365));
+        for (day, month) in [(0, 36), (59, 37), (60, 38), (365, 47)] {
+            assert_eq!(leap.month_and_strength(day).0, month, "{day}");
+        }
+        assert_eq!(GeneratedSteps::Year(2009).edges(), days.edges());
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("none.nc");
         let none = generate_china_sea(&path, 0.02, 1, GeneratedSteps::Days(0), &|_, _| {});
         assert!(none.unwrap_err().to_string().contains("0 days"));
+        let before = generate_china_sea(&path, 0.02, 1, GeneratedSteps::Year(2008), &|_, _| {});
+        assert!(before.unwrap_err().to_string().contains("2008"));
     }
 
     #[test]

@@ -6,7 +6,7 @@ use hdf5::{Dataset, File, SliceOrIndex};
 use ndarray::ArrayView2;
 use netcdf4::{attach, create, scale, texts};
 
-use super::{FILL, Shape, YEAR};
+use super::{FILL, MONTHS, Shape, YEAR};
 
 /// Cells of a chunk: a map at scale 1 is 12 x 6 of them.
 const CHUNK_ROWS: usize = 205;
@@ -22,23 +22,24 @@ struct Axes {
     side: Dataset,
 }
 
-/// Writes the file; `edges_days` are days since the start of the year at which steps begin and the last one ends, `values`
+/// Writes the file; the title ends with `years`, `edges_days` are days since the start of 2009 at which steps begin and the last one ends, `values`
 /// gives those of a step, `[row, col]` from the south.
 pub(super) fn write(
     path: &Path,
     shape: Shape,
-    seed: u64,
+    (seed, years): (u64, &str),
     edges_days: &[f64],
     mut values: impl FnMut(usize) -> Vec<f32>,
 ) -> hdf5::Result<()> {
     let file = create(path)?;
     let generator = format!("fluxglobe china-sea, seed {seed}");
-    let title = "SYNTHETIC China Sea air-sea CO2 flux 2009: made up by a program, no measurement";
+    let title =
+        format!("SYNTHETIC China Sea air-sea CO2 flux{years}: made up by a program, no measurement");
     texts(
         &file,
         &[
             ("Conventions", "CF-1.8"),
-            ("title", title),
+            ("title", &title),
             ("source", "fluxglobe generate china-sea"),
             ("generator", &generator),
         ],
@@ -141,17 +142,14 @@ fn create_flux(file: &File, shape: Shape, step_count: usize, axes: &Axes) -> hdf
     Ok(flux)
 }
 
-/// Days from the start of the year to the start of a month, 12 for the start of the next year.
+/// Days from the start of 2009 to the start of a month, 0 for that January, 12 for the one after.
 pub(super) fn first_day(month: usize) -> f64 {
-    let start = |year, month| {
-        contract::time::TimeMs::from_ymd(year, month, 1).map(|t| t.ms() as f64 / 86_400_000.0)
+    let start = |month: usize| {
+        let year = i32::from(YEAR) + (month / MONTHS) as i32;
+        let start = contract::time::TimeMs::from_ymd(year, (month % MONTHS) as u32 + 1, 1);
+        start.map(|t| t.ms() as f64 / 86_400_000.0)
     };
-    let day = if month < 12 {
-        start(YEAR, month as u32 + 1)
-    } else {
-        start(YEAR + 1, 1)
-    };
-    let first = start(YEAR, 1);
-    day.and_then(|day| Ok(day - first?))
-        .expect("months of 2009 exist")
+    start(month)
+        .and_then(|day| Ok(day - start(0)?))
+        .expect("months of 2009 and later exist")
 }

@@ -1,0 +1,350 @@
+"""Statistics over many years: `fluxglobe serve` beside xarray and dask, on the same values, one machine, in one run.
+
+The made-up China Sea (`fluxglobe generate china-sea --years N`, 450 x 615 cells a day) is landed here, and written as Zarr there
+in two layouts: whole maps by 32 steps, and tiles of 41 x 45 cells over all of time. For each question the peer's better layout
+counts, its weights made before it is timed; ours are made within the time. Both machines' files are in the page cache. Answers
+of both are compared before any figure is printed.
+
+Every question of ours is a new one, over a place that was not asked for before; `again` asks the same a second time.
+
+    make bench ARGS="statistics"            # 16 years need 25 GB of disk and 12 GB of memory
+    make bench ARGS="statistics --years 2"
+"""
+
+import argparse
+import json
+import math
+import os
+import subprocess
+import sys
+import tempfile
+import time
+import urllib.parse
+import urllib.request
+from pathlib import Path
+
+import tiles
+
+SCALE = 0.25
+SEED = 1
+# What the files hold is mmol CO2 m-2 d-1, what our answers hold g C m-2 a-1.
+GRAMS_A_YEAR = tiles.GRAMS_A_YEAR
+REPEATS = 5
+# Ours and theirs may differ by rounding to six digits, and by how a cell is cut along a slanted edge.
+TOLERANCE = 2e-4
+
+
+def main():
+    options = arguments()
+    with tempfile.TemporaryDirectory(dir=options.folder) as folder:
+        folder = Path(options.data or folder)
+        folder.mkdir(parents=True, exist_ok=True)
+        product, builds = data(options, folder)
+        peer = Peer(folder, options)
+        ours = Ours(options, folder, product)
+        try:
+            rows = [question(ours, peer) for question in (point, line, polygon, polygon_year)]
+        finally:
+            ours.stop()
+        print_table(rows, builds, peer, options)
+
+
+def arguments():
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--program", required=True, help="the fluxglobe to measure")
+    parser.add_argument("--years", type=int, default=16, help="years of days")
+    parser.add_argument("--folder", help="where temporary files are made")
+    parser.add_argument("--data", help="folder that keeps what was made and landed, for another run")
+    parser.add_argument("--json", action="store_true", help="figures as JSON")
+    return parser.parse_args()
+
+
+def data(options, folder):
+    """Lands the files here and writes them as Zarr there; how long each took, and what it holds on disk."""
+    builds = folder / "builds.json"
+    if builds.exists():
+        told = json.loads(builds.read_text())
+        return told["product"], told["builds"]
+    program = options.program
+    tiles.say(f"making {options.years} years of the China Sea")
+    files = tiles.run(program, "generate", "china-sea", "--scale", SCALE, "--seed", SEED, "--years", options.years, "--output", folder / "sea.h5").split()
+    tiles.say("landing them")
+    begin = time.time()
+    tiles.run(program, "--data", folder / "data", "ingest", *files)
+    landed = time.time() - begin
+    listed = json.loads(tiles.run(program, "--data", folder / "data", "products", "--json"))
+    product = next(row["product"] for row in listed if not row["product"].endswith("-accumulated"))
+    tiles.say("writing Zarr")
+    begin = time.time()
+    write_zarr(files, folder)
+    written = time.time() - begin
+    told = [
+        {"who": "fluxglobe: both layouts", "seconds": landed, "bytes": size(folder / "data")},
+        {"who": "xarray: both layouts", "seconds": written, "bytes": size(folder / "maps.zarr") + size(folder / "times.zarr")},
+    ]
+    builds.write_text(json.dumps({"product": product, "builds": told}))
+    return product, told
+
+
+def size(folder):
+    return sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())
+
+
+def write_zarr(files, folder):
+    import numpy as np
+    import xarray as xr
+
+    parts, times = [], []
+    for file in files:
+        with xr.open_dataset(file, engine="h5netcdf", phony_dims="sort") as one:
+            name = next(name for name, array in one.data_vars.items() if array.ndim == 3)
+            parts.append(one[name].values.astype("float32"))
+            times.append(one["time"].values)
+            lat, lon = one["lat"].values, one["lon"].values
+    cube = xr.Dataset(
+        {"flux": (("time", "lat", "lon"), np.concatenate(parts))},
+        coords={"time": np.concatenate(times), "lat": lat, "lon": lon},
+    )
+    del parts
+    rows, cols = len(lat), len(lon)
+    cube.to_zarr(folder / "maps.zarr", encoding={"flux": {"chunks": (32, rows, cols)}})
+    cube.to_zarr(folder / "times.zarr", encoding={"flux": {"chunks": (len(cube["time"]), 41, 45)}})
+
+
+class Peer:
+    """xarray with dask, its two layouts opened."""
+
+    def __init__(self, folder, options):
+        import dask
+        import xarray as xr
+
+        dask.config.set(scheduler="threads", num_workers=os.cpu_count())
+        self.cubes = {name: xr.open_zarr(folder / f"{name}.zarr")["flux"] for name in ("maps", "times")}
+        any_cube = self.cubes["times"]
+        self.lat, self.lon = any_cube["lat"].values, any_cube["lon"].values
+        self.steps = any_cube.sizes["time"]
+
+    def best(self, ask):
+        """The quickest answer of the better layout: name, seconds, answer."""
+        tried = []
+        for name, cube in self.cubes.items():
+            ask(cube)
+            times = []
+            for _ in range(3):
+                begin = time.perf_counter()
+                answer = ask(cube)
+                times.append(time.perf_counter() - begin)
+            tried.append((min(times), name, answer))
+        return min(tried, key=lambda it: it[0])
+
+    def weighted_mean(self, rows, cols, weights):
+        """Asks for the mean over cells that weigh `weights`, step by step."""
+        import xarray as xr
+
+        own = xr.DataArray(weights, dims=("lat", "lon"))
+
+        def ask(cube):
+            window = cube[:, rows, cols].drop_vars(["lat", "lon"])
+            return window.weighted(own).mean(("lat", "lon")).values
+
+        return ask
+
+    def areas(self):
+        """Areas of cells on WGS84 by row, m2."""
+        from pyproj import Geod
+
+        geod = Geod(ellps="WGS84")
+        half = abs(self.lat[1] - self.lat[0]) / 2
+        wide = abs(self.lon[1] - self.lon[0])
+        found = []
+        for lat in self.lat:
+            # Parallels are no geodesics: many short ones are.
+            along = [wide * part / 64 for part in range(65)]
+            lons = along + along[::-1]
+            lats = [lat - half] * 65 + [lat + half] * 65
+            found.append(abs(geod.polygon_area_perimeter(lons, lats)[0]))
+        return found
+
+
+class Ours:
+    """A running server, asked over HTTP."""
+
+    def __init__(self, options, folder, product):
+        self.port = tiles.free_port()
+        self.product = product
+        self.process = subprocess.Popen(
+            [options.program, "--data", folder / "data", "serve", "--listen", f"127.0.0.1:{self.port}"],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+        tiles.wait_for(self.port, "/readyz")
+
+    def stop(self):
+        self.process.terminate()
+        self.process.wait(timeout=60)
+
+    def ask(self, what, **parameters):
+        query = urllib.parse.urlencode(parameters)
+        begin = time.perf_counter()
+        content = tiles.get(self.port, f"/api/products/{self.product}/{what}?{query}")
+        return time.perf_counter() - begin, content
+
+    def new(self, what, variants):
+        """The median over questions that are new, the time of the last one asked again, and the first one's answer."""
+        times, first = [], None
+        for parameters in variants:
+            seconds, content = self.ask(what, **parameters)
+            times.append(seconds)
+            first = first or json.loads(content)
+        again = min(self.ask(what, **variants[-1])[0] for _ in range(3))
+        return sorted(times)[len(times) // 2], again, first
+
+
+def values_of(answer, name="mean"):
+    if "series" in answer:
+        return [step["value"] for step in answer["series"]]
+    return [row["values"][name] for row in answer["rows"]]
+
+
+def compared(name, ours, theirs):
+    if len(ours) != len(theirs):
+        sys.exit(f"{name}: {len(ours)} steps beside {len(theirs)}")
+    scale = max(abs(float(value)) for value in theirs if not math.isnan(value)) * GRAMS_A_YEAR
+    worst = 0.0
+    for step, (own, other) in enumerate(zip(ours, theirs)):
+        if own is None or math.isnan(other):
+            if (own is None) != math.isnan(other):
+                sys.exit(f"{name}, step {step}: {own} beside {other}")
+            continue
+        worst = max(worst, abs(own - other * GRAMS_A_YEAR) / scale)
+    if worst > TOLERANCE:
+        sys.exit(f"{name}: answers differ by {worst:.2e} of the largest")
+    return worst
+
+
+def row(name, ours, peer, differ):
+    seconds, layout, _answer = peer
+    return {"question": name, "ours_s": ours[0], "again_s": ours[1], "peer_s": seconds, "layout": layout, "differ": differ}
+
+
+def point(ours, peer):
+    tiles.say("a point")
+    places = [(114.0333 + 0.2 * at, 14.0333 + 0.2 * at) for at in range(REPEATS)]
+    own = ours.new("point", [{"lon": lon, "lat": lat} for lon, lat in places])
+    lon, lat = places[0]
+    other = peer.best(lambda cube: cube.sel(lon=lon, lat=lat, method="nearest").values)
+    return row("point, all steps", own, other, compared("point", values_of(own[2]), other[2]))
+
+
+def line(ours, peer):
+    """500 vertices from the Gulf of Tonkin to Palawan and back, wound: the cells nearest to each vertex at the peer's."""
+    tiles.say("a line of 500 vertices")
+    import numpy as np
+    import xarray as xr
+
+    def vertices(shift):
+        at = np.linspace(0, 1, 500)
+        return 108 + shift + 10 * at, 18.5 + shift - 8 * at + 0.8 * np.sin(25 * at)
+
+    texts = []
+    for number in range(REPEATS):
+        lon, lat = vertices(0.05 * number)
+        texts.append(";".join(f"{x:.5f},{y:.5f}" for x, y in zip(lon, lat)))
+    own = ours.new("line", [{"line": text, "step": "native", "statistic": "mean"} for text in texts])
+    # The peer's way: points close together along the line, each the value of its cell, by the length it stands for.
+    weights = line_weights(peer, *vertices(0.0))
+    rows, cols, shares = weights
+    places = {"lat": xr.DataArray(rows, dims="cell"), "lon": xr.DataArray(cols, dims="cell")}
+    share = xr.DataArray(shares, dims="cell")
+    other = peer.best(lambda cube: cube.isel(**places).drop_vars(["lat", "lon"]).weighted(share).mean("cell").values)
+    return row("line of 500 vertices, all steps", own, other, compared("line", values_of(own[2]), other[2]))
+
+
+def line_weights(peer, lon, lat):
+    """Length of a line in each cell: rows, columns, metres."""
+    import numpy as np
+    from pyproj import Geod
+
+    geod = Geod(ellps="WGS84")
+    parts = {}
+    for at in range(len(lon) - 1):
+        *_, length = geod.inv(lon[at], lat[at], lon[at + 1], lat[at + 1])
+        pieces = 400
+        inner = (np.arange(pieces) + 0.5) / pieces
+        xs = lon[at] + inner * (lon[at + 1] - lon[at])
+        ys = lat[at] + inner * (lat[at + 1] - lat[at])
+        col = np.floor((xs - peer.lon[0]) / (peer.lon[1] - peer.lon[0]) + 0.5).astype(int)
+        row_ = np.floor((ys - peer.lat[0]) / (peer.lat[1] - peer.lat[0]) + 0.5).astype(int)
+        for key in zip(row_, col):
+            parts[key] = parts.get(key, 0.0) + length / pieces
+    keys = sorted(parts)
+    return [key[0] for key in keys], [key[1] for key in keys], np.array([parts[key] for key in keys])
+
+
+def outline(shift):
+    """Some 46,000 cells of the South China Sea, with a coast of bays."""
+    around = [2 * math.pi * at / 48 for at in range(48)]
+    radius = [8.05 + 0.9 * math.sin(5 * angle) + 0.5 * math.cos(9 * angle) for angle in around]
+    ring = [(115 + shift + r * math.cos(a), 15 + shift + r * math.sin(a)) for r, a in zip(radius, around)]
+    return [(round(x, 5), round(y, 5)) for x, y in ring]
+
+
+def polygon_weights(peer, ring):
+    """Areas of cells inside: rows and columns as slices, weights, cells that have any."""
+    import numpy as np
+    import shapely
+
+    area = np.array(peer.areas())
+    shape = shapely.Polygon(ring)
+    west, south, east, north = shape.bounds
+    dlat, dlon = peer.lat[1] - peer.lat[0], peer.lon[1] - peer.lon[0]
+    rows = np.flatnonzero((peer.lat + abs(dlat) / 2 > south) & (peer.lat - abs(dlat) / 2 < north))
+    cols = np.flatnonzero((peer.lon + dlon / 2 > west) & (peer.lon - dlon / 2 < east))
+    rows, cols = slice(rows[0], rows[-1] + 1), slice(cols[0], cols[-1] + 1)
+    x, y = np.meshgrid(peer.lon[cols], peer.lat[rows])
+    boxes = shapely.box(x - dlon / 2, y - abs(dlat) / 2, x + dlon / 2, y + abs(dlat) / 2)
+    share = shapely.area(shapely.intersection(boxes, shape)) / (abs(dlat) * dlon)
+    weights = share * area[rows][:, None]
+    return rows, cols, weights, int((share > 0).sum())
+
+
+def polygon(ours, peer):
+    tiles.say("a polygon")
+    rings = [outline(0.021 * at) for at in range(REPEATS)]
+    texts = ["POLYGON((" + ",".join(f"{x} {y}" for x, y in [*ring, ring[0]]) + "))" for ring in rings]
+    own = ours.new("area", [{"region": text, "statistic": "mean", "step": "native"} for text in texts])
+    rows, cols, weights, cells = polygon_weights(peer, rings[0])
+    other = peer.best(peer.weighted_mean(rows, cols, weights))
+    return row(f"polygon of {cells} cells, all steps", own, other, compared("polygon", values_of(own[2]), other[2]))
+
+
+def polygon_year(ours, peer):
+    """The last year of it alone."""
+    tiles.say("a polygon, one year")
+    rings = [outline(0.013 + 0.023 * at) for at in range(REPEATS)]
+    texts = ["POLYGON((" + ",".join(f"{x} {y}" for x, y in [*ring, ring[0]]) + "))" for ring in rings]
+    period = {"from": "2010", "to": "2011"} if peer.steps > 365 else {}
+    own = ours.new("area", [{"region": text, "statistic": "mean", "step": "native", **period} for text in texts])
+    rows, cols, weights, cells = polygon_weights(peer, rings[0])
+    mean = peer.weighted_mean(rows, cols, weights)
+    year = slice(365, 730) if peer.steps > 365 else slice(None)
+    other = peer.best(lambda cube: mean(cube[year]))
+    return row(f"polygon of {cells} cells, 365 steps", own, other, compared("polygon, a year", values_of(own[2]), other[2]))
+
+
+def print_table(rows, builds, peer, options):
+    if options.json:
+        print(json.dumps({"steps": peer.steps, "builds": builds, "questions": rows}))
+        return
+    print(f"{peer.steps} steps of {len(peer.lat)} x {len(peer.lon)} cells, {os.cpu_count()} cores, files in the page cache, equal answers")
+    for build in builds:
+        print(f"  {build['who']:28} {build['seconds']:8.1f} s {build['bytes'] / 1e9:8.2f} GB")
+    print(f"{'question':40} {'fluxglobe':>12} {'again':>10} {'xarray+dask':>14} {'layout':>7} {'times':>7} {'differ':>9}")
+    for row_ in rows:
+        times = row_["peer_s"] / row_["ours_s"]
+        ms = [row_[key] * 1e3 for key in ("ours_s", "again_s", "peer_s")]
+        print(f"{row_['question']:40} {ms[0]:9.1f} ms {ms[1]:7.1f} ms {ms[2]:11.1f} ms {row_['layout']:>7} {times:6.1f}x {row_['differ']:9.1e}")
+
+
+if __name__ == "__main__":
+    main()
