@@ -3,13 +3,11 @@
 //! Every session that plans or runs our queries (client, scheduler, executor) gets them from here.
 
 mod accumulate;
-mod band_sums;
 mod column_sum;
 mod computed;
 mod has_data;
 mod lists;
 mod merge_accumulated;
-mod region_sums;
 mod sound;
 
 use std::sync::Arc;
@@ -22,18 +20,14 @@ pub(crate) use computed::{FIELD as COMPUTED_FIELD, SERIES as COMPUTED_EXTENT};
 use crate::Objects;
 use crate::expression::udf::number_functions;
 
-/// Every scalar function; those that sum over a region read its weights from `objects`, those that compute products store
+/// Every scalar function; those that accumulate read values and weights from `objects`, those that compute products store
 /// them there.
 pub fn scalar_functions(objects: &Objects) -> Vec<Arc<ScalarUDF>> {
-    let region_sums = region_sums::RegionSums::new(objects.clone());
-    let band_sums = band_sums::BandSums::new(objects.clone());
     let accumulate = accumulate::Accumulate::new(objects.clone());
     let [fields, series] = computed::both(objects);
     let stored = [
         AsyncScalarUDF::new(Arc::new(fields)).into_scalar_udf(),
         AsyncScalarUDF::new(Arc::new(series)).into_scalar_udf(),
-        AsyncScalarUDF::new(Arc::new(region_sums)).into_scalar_udf(),
-        AsyncScalarUDF::new(Arc::new(band_sums)).into_scalar_udf(),
         AsyncScalarUDF::new(Arc::new(accumulate)).into_scalar_udf(),
         ScalarUDF::from(has_data::HasData::new()),
         ScalarUDF::from(sound::Sound::new()),

@@ -11,7 +11,9 @@ mod cells;
 mod histogram;
 mod kernel;
 mod order;
+mod over_steps;
 mod percentiles;
+mod region_sums;
 pub(crate) mod remembered;
 mod run;
 mod scale;
@@ -20,3 +22,6 @@ mod tasks;
 mod weighed;
 
 pub use answer::{statistics, statistics_of};
+pub(crate) use over_steps::{RegionOnGrid, sums_over_region};
+pub(crate) use region_sums::RegionStepSums;
+

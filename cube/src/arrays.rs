@@ -58,7 +58,7 @@ pub(crate) fn values(description: &Description, steps: u64) -> Result<Definition
     )
 }
 
-/// The time-major copy of the values, `[lat, lon, time]` of complete runs: shards of blocks of cells.
+/// The time-major copy of the values, `[lat, lon, time]` of runs: shards of blocks of cells.
 pub(crate) fn series(description: &Description, runs: usize) -> Result<Definition, CubeError> {
     let (grid, [rows, cols]) = (
         &description.grid,

@@ -44,7 +44,7 @@ impl Drop for Task {
     }
 }
 
-/// Has the complete runs of the cube in a folder made time-major, some time.
+/// Has the runs of the cube in a folder made time-major, some time.
 pub(crate) fn begin(store: Store, folder: String) {
     let Some(task) = Task::new(format!("{}{folder}", store.url())) else {
         return;

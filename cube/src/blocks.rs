@@ -3,8 +3,11 @@
 //! The library's reader of shards holds every index that it ever saw, and reads one at a time; a region of a large grid
 //! touches thousands of them.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use bytes::Bytes;
+use futures::stream::{self, StreamExt as _, TryStreamExt as _};
 use quick_cache::Weighter;
 use quick_cache::sync::Cache;
 use zarrs::array::Array;
@@ -13,8 +16,7 @@ use zarrs::storage::byte_range::ByteRange;
 use zarrs_icechunk::AsyncIcechunkStore;
 
 use crate::error::first_lines;
-use crate::field::Decoder;
-use crate::layout::BLOCK_CELLS;
+use crate::layout::{BLOCK_CELLS, RUN_STEPS};
 use crate::unreadable::Object;
 use crate::{CubeError, Description, Layout, arrays};
 
@@ -22,12 +24,22 @@ use crate::{CubeError, Description, Layout, arrays};
 const INDEX_BYTES: u64 = 16 << 20;
 /// Bytes of an entry: where a block begins in its shard, and its length.
 const ENTRY_BYTES: usize = 16;
-/// Bytes of the checksum of an index.
+/// Bytes of the checksum of an index, or of a block.
 const CRC_BYTES: usize = 4;
+/// Blocks of a shard that so few bytes lie between are read together: that is quicker than to ask again.
+const GAP_BYTES: u64 = 32 << 10;
+/// Parts of a shard that are read at a time.
+const READS_AT_ONCE: usize = 8;
+const NO_SHARD: &str = "its shard is not there";
+/// Values of a block in a run.
+const BLOCK_VALUES: usize = (BLOCK_CELLS * BLOCK_CELLS) as usize * RUN_STEPS;
 
 /// Where the blocks of a shard begin in it, and their lengths, which are nothing for those without data; a shard holds 128 MiB
 /// of values at most.
 type Index = Vec<[u32; 2]>;
+
+/// A block in its shard: its first byte, how many it has, and which it is of those asked for.
+type Place = (u64, u64, usize);
 
 #[derive(Clone)]
 struct IndexWeight;
@@ -44,7 +56,6 @@ pub(crate) struct Blocks {
     /// Rows and columns of blocks in a shard.
     shard: [u32; 2],
     indexes: Cache<[u64; 3], Arc<Index>, IndexWeight>,
-    decoder: Decoder,
     /// For messages.
     place: String,
 }
@@ -67,7 +78,6 @@ impl Blocks {
                 INDEX_BYTES,
                 IndexWeight,
             ),
-            decoder: Decoder::of_blocks(description)?,
             place: place.to_owned(),
         })
     }
@@ -75,23 +85,6 @@ impl Blocks {
     /// Name of the array.
     pub(crate) fn name(&self) -> String {
         arrays::name(&self.array)
-    }
-
-    /// Values of a block in a run, `[cell, step]`, 8 x 8 cells wherever the grid ends; none where no cell has data.
-    pub(crate) async fn read(
-        &self,
-        run: usize,
-        block: [u32; 2],
-    ) -> Result<Option<Vec<f32>>, CubeError> {
-        let shard = [block[0] / self.shard[0], block[1] / self.shard[1]];
-        let key = [shard[0].into(), shard[1].into(), run as u64];
-        match self.decoded(key, block).await {
-            Ok(values) => Ok(values),
-            Err(reason) => {
-                let chunk = [block[0].into(), block[1].into(), run as u64];
-                Err(self.object(key).unreadable(chunk, &reason).await)
-            }
-        }
     }
 
     fn object(&self, shard: [u64; 3]) -> Object<'_> {
@@ -102,19 +95,90 @@ impl Blocks {
         }
     }
 
-    async fn decoded(&self, key: [u64; 3], block: [u32; 2]) -> Result<Option<Vec<f32>>, String> {
+    /// Blocks of a run as they are stored, in the order asked for; none where no cell has data. Those that lie near one another
+    /// in a shard are read together.
+    pub(crate) async fn encoded(
+        &self,
+        run: usize,
+        blocks: &[[u32; 2]],
+    ) -> Result<Vec<Option<Bytes>>, CubeError> {
+        let mut by_shard: BTreeMap<[u32; 2], Vec<usize>> = BTreeMap::new();
+        for (number, block) in blocks.iter().enumerate() {
+            let shard = [block[0] / self.shard[0], block[1] / self.shard[1]];
+            by_shard.entry(shard).or_default().push(number);
+        }
+        let mut found = vec![None; blocks.len()];
+        for (shard, numbers) in by_shard {
+            let key = [shard[0].into(), shard[1].into(), run as u64];
+            if let Err(reason) = self.read_near(key, &numbers, blocks, &mut found).await {
+                return Err(self.object(key).unreadable(key, &reason).await);
+            }
+        }
+        Ok(found)
+    }
+
+    /// Reads blocks of one shard.
+    async fn read_near(
+        &self,
+        key: [u64; 3],
+        numbers: &[usize],
+        blocks: &[[u32; 2]],
+        found: &mut [Option<Bytes>],
+    ) -> Result<(), String> {
         let index = self.index(key).await?;
+        let place = |number: &usize| {
+            let [offset, length] = self.place_in(&index, blocks[*number]);
+            (u64::from(offset), u64::from(length), *number)
+        };
+        let mut places: Vec<Place> = numbers.iter().map(place).collect();
+        places.retain(|(_offset, length, _number)| *length > 0);
+        places.sort_unstable();
+        let is_near = |a: &Place, b: &Place| b.0 <= a.0 + a.1 + GAP_BYTES;
+        let near = places.chunk_by(is_near).map(<[_]>::to_vec);
+        let near: Vec<Vec<Place>> = near.collect();
+        let reads = stream::iter(near).map(|near| self.read_together(key, near));
+        let mut reads = reads.buffered(READS_AT_ONCE);
+        while let Some((near, content)) = reads.try_next().await? {
+            let first = near.first().map_or(0, |(offset, ..)| *offset);
+            for (offset, length, number) in near {
+                let start = (offset - first) as usize;
+                let range = start..start + length as usize;
+                if range.end > content.len() {
+                    return Err("its shard is shorter than its index says".to_owned());
+                }
+                found[number] = Some(content.slice(range));
+            }
+        }
+        Ok(())
+    }
+
+    /// Reads what lies from the first of these places to the last.
+    async fn read_together(
+        &self,
+        key: [u64; 3],
+        near: Vec<Place>,
+    ) -> Result<(Vec<Place>, Bytes), String> {
+        let start = near.first().map_or(0, |(offset, ..)| *offset);
+        let ends = near.iter().map(|(offset, length, _)| offset + length);
+        let length = ends.max().unwrap_or(start) - start;
+        let range = ByteRange::FromStart(start, Some(length));
+        let content = self.part(key, range).await?.ok_or(NO_SHARD)?;
+        Ok((near, Bytes::from(content)))
+    }
+
+    /// Where a block lies in its shard: first byte, and how many, none without data.
+    fn place_in(&self, index: &Index, block: [u32; 2]) -> [u32; 2] {
         let inside = [block[0] % self.shard[0], block[1] % self.shard[1]];
         let number = (inside[0] * self.shard[1] + inside[1]) as usize;
-        let [offset, length] = index.get(number).copied().unwrap_or_default();
-        if length == 0 {
-            return Ok(None);
-        }
-        let range = ByteRange::FromStart(offset.into(), Some(length.into()));
-        let found = self.part(key, range).await?;
-        let content = found.ok_or("its shard is not there")?;
-        // A few ten microseconds: not worth another thread.
-        self.decoder.decode(content).map(Some)
+        index.get(number).copied().unwrap_or_default()
+    }
+
+    /// The error of a block that cannot be decoded.
+    pub(crate) async fn undecoded(&self, run: usize, block: [u32; 2], reason: &str) -> CubeError {
+        let shard = [block[0] / self.shard[0], block[1] / self.shard[1]];
+        let key = [shard[0].into(), shard[1].into(), run as u64];
+        let chunk = [block[0].into(), block[1].into(), run as u64];
+        self.object(key).unreadable(chunk, reason).await
     }
 
     /// Values of a whole shard, `[row, col, step]`; none where no cell has data. The library compares the checksum of a
@@ -156,6 +220,43 @@ impl Blocks {
         let index = Arc::new(index);
         self.indexes.insert(shard, Arc::clone(&index));
         Ok(index)
+    }
+}
+
+/// Decodes one block after the other. The library's chain of codecs makes its tables anew for every block, which takes longer
+/// than to decode it.
+pub(crate) struct BlockDecoder {
+    zstd: zstd::bulk::Decompressor<'static>,
+    bytes: Vec<u8>,
+    values: Vec<f32>,
+}
+
+impl BlockDecoder {
+    pub(crate) fn new() -> Result<Self, String> {
+        let zstd = zstd::bulk::Decompressor::new();
+        Ok(Self {
+            zstd: zstd.map_err(|e| e.to_string())?,
+            bytes: vec![0; BLOCK_VALUES * size_of::<f32>()],
+            values: vec![f32::NAN; BLOCK_VALUES],
+        })
+    }
+
+    /// Values of a block, `[cell, step]`, whose checksum is compared with its bytes first.
+    pub(crate) fn decode(&mut self, content: &[u8]) -> Result<&[f32], String> {
+        let (compressed, _told) = content
+            .split_last_chunk::<CRC_BYTES>()
+            .filter(|(own, told)| crc32c::crc32c(own) == u32::from_le_bytes(**told))
+            .ok_or("its bytes are not those of its checksum (crc32c)")?;
+        // It holds as many bytes as a block has, or is refused.
+        let count = self.zstd.decompress_to_buffer(compressed, &mut self.bytes);
+        if count.map_err(|e| e.to_string())? != self.bytes.len() {
+            return Err("it holds less than a block".to_owned());
+        }
+        let (bytes, _rest) = self.bytes.as_chunks();
+        for (value, bytes) in self.values.iter_mut().zip(bytes) {
+            *value = f32::from_le_bytes(*bytes);
+        }
+        Ok(&self.values)
     }
 }
 

@@ -99,7 +99,7 @@ pub fn of_values(description: &Description) -> Map<String, Value> {
 /// Of the time-major copy of the values.
 pub(crate) fn of_series(description: &Description) -> Map<String, Value> {
     let mut attributes = of_values(description);
-    let comment = "a copy of the values for reading along time, of complete runs of steps from the first one on; NaN, too, where a run is not made yet, which steps_sha256 tells by zeros";
+    let comment = "a copy of the values for reading along time, of runs of 128 steps from the first one on; NaN, too, where a run is not made yet, which steps_sha256 tells by zeros, and at the end of the last one, which lacks the newest steps";
     attributes.insert("comment".to_owned(), comment.into());
     attributes
 }

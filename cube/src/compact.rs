@@ -1,4 +1,4 @@
-//! The cube of a product in, its complete runs of steps time-major out: what is there map-major is turned, run by run.
+//! The cube of a product in, its runs of steps time-major out: what is there map-major is turned, run by run.
 //!
 //! Nothing waits for it, and it may be killed at any point: what was sent and not committed is removed by clean-up, and
 //! whoever publishes next goes on. Two that do the same at once send the same values, and the second finds them there.
@@ -27,7 +27,7 @@ const STEPS_AT_ONCE: usize = 16;
 /// A shard that is in the store, by its row and column; none where no cell has data.
 type Shard = ([u32; 2], Option<ChunkPayload>);
 
-/// Makes the runs of the cube in a folder of a store that are complete and not there yet; how many that were.
+/// Makes the runs of the cube in a folder of a store that are not there yet, the last one if it lacks many steps; how many that were.
 ///
 /// # Errors
 /// `Missing` if there is no cube. A chunk that is damaged or gone: no run is made of it.
@@ -69,9 +69,10 @@ impl Compaction<'_> {
     async fn run(&self, run: usize) -> Result<Vec<Shard>, CubeError> {
         let session = self.repository.session().await?;
         let failed = |e: &dyn std::fmt::Display| self.repository.failed("storing a series", e);
+        let held = series::steps_of(run, self.cube.steps()).len();
         let mut shards = vec![];
         for shard in self.encoder.shards() {
-            let values = turned(self.cube, &self.encoder, run, shard).await?;
+            let values = turned(self.cube, &self.encoder, (run, held), shard).await?;
             let encoder = Arc::clone(&self.encoder);
             let encoded = tokio::task::spawn_blocking(move || encoder.encode(values));
             let Some(content) = encoded.await.map_err(|e| thread(&e))?? else {
@@ -93,9 +94,10 @@ impl Compaction<'_> {
 /// `Chunk` with the first shard that does not.
 pub(crate) async fn compare(cube: &Cube, run: usize) -> Result<(), CubeError> {
     let encoder = SeriesEncoder::new(cube.description())?;
+    let held = cube.runs().held_count(run, cube.steps());
     for shard in encoder.shards() {
         let told = cube.shard(run, shard).await?;
-        let own = turned(cube, &encoder, run, shard).await?;
+        let own = turned(cube, &encoder, (run, held), shard).await?;
         let is_same = match &told {
             Some(told) => {
                 let bits = |value: &f32| value.to_bits();
@@ -114,16 +116,16 @@ pub(crate) async fn compare(cube: &Cube, run: usize) -> Result<(), CubeError> {
     Ok(())
 }
 
-/// Values of a shard of a run, `[row, col, step]`, read map-major.
+/// Values of a shard of the first `held` steps of a run, `[row, col, step]`, read map-major.
 async fn turned(
     cube: &Cube,
     encoder: &SeriesEncoder,
-    run: usize,
+    (run, held): (usize, usize),
     shard: [u32; 2],
 ) -> Result<Vec<f32>, CubeError> {
     let (window, cols) = (encoder.window(shard), encoder.shard_cols());
     let mut turned = vec![f32::NAN; encoder.shard_values()];
-    let all: Vec<usize> = series::steps_of(run).collect();
+    let all: Vec<usize> = series::steps_of(run, cube.steps()).take(held).collect();
     for (number, steps) in all.chunks(STEPS_AT_ONCE).enumerate() {
         let maps: Vec<Vec<f32>> = stream::iter(steps.iter().copied())
             .map(|step| cube.window(step, window))
@@ -167,6 +169,7 @@ async fn place(
 ) -> Result<bool, CubeError> {
     let failed = |e: &dyn std::fmt::Display| repository.failed("placing a series", e);
     let description = made_of.description();
+    let held = series::steps_of(run, made_of.steps()).len();
     let Some(name) = series::name_of(run, made_of.steps()) else {
         return Ok(false);
     };
@@ -174,8 +177,8 @@ async fn place(
     for _attempt in 0..ATTEMPTS {
         let state = State::newest(repository).await?;
         let is_same = state.describes_same_cells(description)
-            && series::name_of(run, &state.steps) == Some(name);
-        if !is_same || state.runs.is_of(run, &state.steps) {
+            && series::name_of_first(held, run, &state.steps) == Some(name);
+        if !is_same || state.runs.held_count(run, &state.steps) >= held {
             return Ok(false);
         }
         let arrays = Arc::new(AsyncIcechunkStore::from(Arc::clone(&state.session)));

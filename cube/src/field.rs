@@ -12,7 +12,7 @@ use zarrs::array::{
 };
 
 use crate::arrays::{self, Definition};
-use crate::layout::{BLOCK_CELLS, RUN_STEPS};
+use crate::layout::RUN_STEPS;
 use crate::{CubeError, Description, Layout};
 
 /// Writes fields of one grid as objects of the layout.
@@ -163,16 +163,7 @@ impl Decoder {
     /// Of map-major chunks, `[row, col]`.
     pub(crate) fn new(description: &Description) -> Result<Self, CubeError> {
         let chunk = Layout::of(&description.grid).chunk;
-        Self::shaped(description, [1, chunk[0].into(), chunk[1].into()])
-    }
-
-    /// Of blocks of the time-major copy, `[cell, step]`.
-    pub(crate) fn of_blocks(description: &Description) -> Result<Self, CubeError> {
-        let side = u64::from(BLOCK_CELLS);
-        Self::shaped(description, [side, side, RUN_STEPS as u64])
-    }
-
-    fn shaped(description: &Description, shape: [u64; 3]) -> Result<Self, CubeError> {
+        let shape = [1, chunk[0].into(), chunk[1].into()];
         let side = |cells: u64| NonZeroU64::new(cells).unwrap_or(NonZeroU64::MIN);
         Ok(Self {
             definition: arrays::values(description, 1)?,

@@ -11,9 +11,9 @@ const MOST_OBJECTS: u32 = 64;
 /// Chunks along each side of a shard: 64 MiB of values at most.
 const SHARD_SIDE: u32 = 8;
 
-/// Steps of a run of the time-major copy: a point reads 32 KiB of values for each, and of what no complete run holds yet a
+/// Steps of a run of the time-major copy: a point reads 32 KiB of values for each, and of what no run holds yet a
 /// map-major chunk for each step.
-pub(crate) const RUN_STEPS: usize = 128;
+pub const RUN_STEPS: usize = 128;
 /// Side of a block of the time-major copy, cells.
 pub const BLOCK_CELLS: u32 = 8;
 

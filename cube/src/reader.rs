@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use bytes::Bytes;
 use contract::chunk::Window;
 use futures::stream::{self, StreamExt as _, TryStreamExt as _};
 use icechunk::session::Session;
@@ -37,8 +38,8 @@ struct Inner {
     decoder: Arc<Decoder>,
     /// Runs of the time-major copy.
     runs: Runs,
-    /// Of each run, whether it is made of the steps in its place.
-    is_there: Vec<bool>,
+    /// Of each run, how many of the steps in its place it holds, the first ones.
+    held: Vec<usize>,
     /// Reads them; none where there are none.
     blocks: Option<Blocks>,
 }
@@ -66,9 +67,9 @@ impl Cube {
             let series = axis::open(&store, &definition, place).await?;
             Some(Blocks::new(series, &description, place)?)
         };
-        let is_there = (0..runs.len()).map(|run| runs.is_of(run, &steps));
+        let held = (0..runs.len()).map(|run| runs.held_count(run, &steps));
         Ok(Self(Arc::new(Inner {
-            is_there: is_there.collect(),
+            held: held.collect(),
             runs,
             blocks,
             layout: Layout::of(&description.grid),
@@ -162,7 +163,7 @@ impl Cube {
     /// The time-major run that holds a step, if it is there.
     pub(crate) fn run_of(&self, step: usize) -> Option<usize> {
         let run = step / RUN_STEPS;
-        self.0.is_there.get(run)?.then_some(run)
+        (step % RUN_STEPS < *self.0.held.get(run)?).then_some(run)
     }
 
     /// Which runs there are.
@@ -170,20 +171,32 @@ impl Cube {
         &self.0.runs
     }
 
-    /// Values of a block in a run that [`Self::run_of`] gave, `[cell, step]`; none where no cell has data.
-    pub(crate) async fn block(
+    /// Blocks of a run that [`Self::run_of`] gave, as they are stored.
+    pub(crate) async fn encoded(
         &self,
         run: usize,
-        block: [u32; 2],
-    ) -> Result<Option<Vec<f32>>, CubeError> {
+        blocks: &[[u32; 2]],
+    ) -> Result<Vec<Option<Bytes>>, CubeError> {
         match &self.0.blocks {
-            Some(blocks) => blocks.read(run, block).await,
-            None => Err(CubeError::Outside {
-                what: format!("run {run} of the time-major copy"),
-                steps: self.0.steps.len(),
-                rows: self.0.description.grid.rows,
-                cols: self.0.description.grid.cols,
-            }),
+            Some(own) => own.encoded(run, blocks).await,
+            None => Err(self.no_run(run)),
+        }
+    }
+
+    /// The error of one of them that cannot be decoded.
+    pub(crate) async fn undecoded(&self, run: usize, block: [u32; 2], reason: &str) -> CubeError {
+        match &self.0.blocks {
+            Some(own) => own.undecoded(run, block, reason).await,
+            None => self.no_run(run),
+        }
+    }
+
+    fn no_run(&self, run: usize) -> CubeError {
+        CubeError::Outside {
+            what: format!("run {run} of the time-major copy"),
+            steps: self.0.steps.len(),
+            rows: self.0.description.grid.rows,
+            cols: self.0.description.grid.cols,
         }
     }
 

@@ -17,6 +17,9 @@ use crate::error::first_lines;
 use crate::layout::RUN_STEPS;
 use crate::{CubeError, Description, Step, axis};
 
+/// So many steps more are worth making the last run anew.
+const LEAST_NEW: usize = 16;
+
 /// Runs from the first step on: of which steps each was made, none where it is not there.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(crate) struct Runs(Vec<Option<Digest>>);
@@ -78,26 +81,44 @@ impl Runs {
         names.filter_map(|(run, name)| name.map(|name| (run, name)))
     }
 
-    /// Is a run there, and made of the steps that are in its place?
+    /// How many of the steps in its place a run holds, the first ones: all of them, those that there were when it was made,
+    /// or none since they are others by now.
+    pub(crate) fn held_count(&self, run: usize, steps: &[Step]) -> usize {
+        let Some(name) = self.0.get(run).copied().flatten() else {
+            return 0;
+        };
+        let all = steps_of(run, steps).len();
+        let is_named = |count: &usize| name_of_first(*count, run, steps) == Some(name);
+        (1..=all).rev().find(is_named).unwrap_or(0)
+    }
+
+    /// Does a run hold all steps that are in its place?
     pub(crate) fn is_of(&self, run: usize, steps: &[Step]) -> bool {
         let own = self.0.get(run).copied().flatten();
         own.is_some() && own == name_of(run, steps)
     }
 
-    /// The first complete run of these steps that is not there.
+    /// The first run of these steps that is to be made: a complete one that is not there, or the last one where it lacks many.
+    /// What is made anew with every [`LEAST_NEW`] steps at first, and later with half as many again, is written less than four times in all.
     pub(crate) fn first_missing(&self, steps: &[Step]) -> Option<usize> {
-        (0..steps.len() / RUN_STEPS).find(|run| !self.is_of(*run, steps))
+        let complete = steps.len() / RUN_STEPS;
+        let missing = (0..complete).find(|run| !self.is_of(*run, steps));
+        missing.or_else(|| {
+            let held = self.held_count(complete, steps);
+            let new = steps.len() % RUN_STEPS - held;
+            (new >= LEAST_NEW.max(held / 2)).then_some(complete)
+        })
     }
 
     /// Those that are still there when the steps are these, and the ones that are not any more.
     pub(crate) fn kept(&self, steps: &[Step]) -> (Self, Vec<usize>) {
         let mut kept = self.clone();
-        let is_gone = |run: &usize| self.0[*run].is_some() && !self.is_of(*run, steps);
+        let is_gone = |run: &usize| self.0[*run].is_some() && self.held_count(*run, steps) == 0;
         let gone: Vec<usize> = (0..self.len()).filter(is_gone).collect();
         for run in &gone {
             kept.0[*run] = None;
         }
-        kept.0.truncate(steps.len() / RUN_STEPS);
+        kept.0.truncate(steps.len().div_ceil(RUN_STEPS));
         (kept, gone)
     }
 
@@ -145,16 +166,22 @@ impl Runs {
     }
 }
 
-/// Steps of a run.
-pub(crate) fn steps_of(run: usize) -> Range<usize> {
-    run * RUN_STEPS..(run + 1) * RUN_STEPS
+/// Steps in the place of a run.
+pub(crate) fn steps_of(run: usize, steps: &[Step]) -> Range<usize> {
+    let end = |run: usize| (run * RUN_STEPS).min(steps.len());
+    end(run)..end(run + 1)
 }
 
-/// The name of a run of these steps; none if it is not complete.
+/// The name of a run of all these steps that are in its place; none if there are none.
 pub(crate) fn name_of(run: usize, steps: &[Step]) -> Option<Digest> {
-    let own = steps.get(steps_of(run))?;
+    name_of_first(steps_of(run, steps).len(), run, steps)
+}
+
+/// The name of a run of the first ones of the steps in its place; none if they are fewer, or none.
+pub(crate) fn name_of_first(count: usize, run: usize, steps: &[Step]) -> Option<Digest> {
+    let own = steps[steps_of(run, steps)].get(..count)?;
     let digests = own.iter().flat_map(|step| *step.values_sha256.as_bytes());
-    Some(Digest::of(&digests.collect::<Vec<u8>>()))
+    (count > 0).then(|| Digest::of(&digests.collect::<Vec<u8>>()))
 }
 
 #[cfg(test)]
@@ -179,14 +206,38 @@ mod tests {
             assert_eq!(runs.first_missing(&own), Some(run));
             runs = runs.with(run, name_of(run, &own).unwrap());
         }
-        assert_eq!(runs.first_missing(&own), None);
-        assert_eq!(name_of(3, &own), None, "it is not complete");
+        assert_eq!(runs.first_missing(&own), None, "five more are too few");
+        assert_eq!(name_of(4, &own), None, "it has no step");
         own[RUN_STEPS].values_sha256 = Digest::of(b"revised");
         assert_eq!(runs.first_missing(&own), Some(1));
         let (kept, gone) = runs.kept(&own);
         assert_eq!(gone, [1]);
         assert!(kept.is_of(0, &own) && !kept.is_of(1, &own) && kept.is_of(2, &own));
-        let (kept, gone) = runs.kept(&own[..=RUN_STEPS]);
+        let (kept, gone) = runs.kept(&own[..RUN_STEPS]);
         assert_eq!((kept.len(), gone), (1, vec![1, 2]));
+    }
+
+    #[test]
+    fn the_last_run_holds_what_there_was_and_is_made_anew_when_much_has_come() {
+        let mut own = steps(2 * RUN_STEPS);
+        let mut runs = Runs::default();
+        let mut made = vec![];
+        for count in 1..=own.len() {
+            if let Some(run) = runs.first_missing(&own[..count]) {
+                runs = runs.with(run, name_of(run, &own[..count]).unwrap());
+                made.push(count);
+            }
+            let held = (0..2).map(|run| runs.held_count(run, &own[..count]));
+            let held: usize = held.sum();
+            assert!(count - held < LEAST_NEW.max(RUN_STEPS / 3), "{count} {held}");
+        }
+        assert_eq!(made, [16, 32, 48, 72, 108, 128, 144, 160, 176, 200, 236, 256]);
+        let at_200 = Runs::default().with(1, name_of(1, &own[..200]).unwrap());
+        assert_eq!(at_200.held_count(1, &own), 72);
+        assert_eq!(at_200.held_count(1, &own[..199]), 0, "a step is gone");
+        assert!(at_200.kept(&own).1.is_empty());
+        own[150].values_sha256 = Digest::of(b"revised");
+        assert_eq!(at_200.held_count(1, &own), 0);
+        assert_eq!(at_200.kept(&own).1, [1]);
     }
 }

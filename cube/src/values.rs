@@ -9,18 +9,20 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
 
+use bytes::Bytes;
 use contract::chunk::Window;
 use contract::kind::Vouched;
 use contract::manifest::Manifest;
 use futures::stream::{self, StreamExt as _, TryStreamExt as _};
 use storage::{Store, fields};
 
+use crate::blocks::BlockDecoder;
 use crate::follow::folder;
 use crate::layout::{BLOCK_CELLS, RUN_STEPS};
 use crate::{At, Cube, CubeError, Repository};
 
-/// Blocks that are read at a time.
-const BLOCKS_AT_ONCE: usize = 16;
+/// Runs that are read at a time.
+const RUNS_AT_ONCE: usize = 16;
 /// Steps that are read map-major at a time.
 const STEPS_AT_ONCE: usize = 4;
 /// Fields that are read at a time, whole.
@@ -106,10 +108,61 @@ impl Block {
 }
 
 /// Steps side by side in a run that are side by side among those asked for.
-struct Piece {
-    in_run: usize,
-    asked: usize,
-    count: usize,
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Piece {
+    /// Place of the first one in the run.
+    pub in_run: usize,
+    /// Its place among those asked for.
+    pub asked: usize,
+    /// How many they are.
+    pub count: usize,
+}
+
+/// Blocks of a run of steps, read and not decoded yet.
+pub struct EncodedBlocks {
+    cube: Cube,
+    run: usize,
+    at: Vec<[u32; 2]>,
+    content: Vec<Option<Bytes>>,
+    pieces: Vec<Piece>,
+}
+
+/// A block that cannot be decoded: its place among those asked for, and why.
+#[derive(Debug)]
+pub struct Undecoded(usize, String);
+
+impl EncodedBlocks {
+    /// Where the steps that were asked for lie in the run.
+    pub fn pieces(&self) -> &[Piece] {
+        &self.pieces
+    }
+
+    /// Decodes one block after the other and hands over its place among those asked for and its values, `[cell, step]` of 8 x 8
+    /// cells and [`RUN_STEPS`](crate::RUN_STEPS) steps, stored unit, NaN no data; those without any data are left out. `take` says whether to go on.
+    ///
+    /// # Errors
+    /// The first block that is damaged; [`EncodedBlocks::error`] makes an error of it.
+    pub fn each(&self, mut take: impl FnMut(usize, &[f32]) -> bool) -> Result<(), Undecoded> {
+        let decoder = BlockDecoder::new();
+        let mut decoder = decoder.map_err(|reason| Undecoded(0, reason))?;
+        for (number, content) in self.content.iter().enumerate() {
+            let Some(content) = content else { continue };
+            let values = decoder.decode(content);
+            let values = values.map_err(|reason| Undecoded(number, reason))?;
+            if !take(number, values) {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// The error of a block that cannot be decoded, which names its object.
+    pub async fn error(&self, undecoded: Undecoded) -> CubeError {
+        let Undecoded(number, reason) = undecoded;
+        self.cube
+            .undecoded(self.run, self.at[number], &reason)
+            .await
+    }
 }
 
 /// What is to be read for some steps, by their places among those asked for.
@@ -152,7 +205,12 @@ impl Values {
         Ok(Self(Arc::new(own)))
     }
 
-    /// Is all of it in the cube, and every complete run time-major? Then it is as fast as it will be.
+    /// The version.
+    pub fn manifest(&self) -> &Manifest {
+        &self.0.manifest
+    }
+
+    /// Is all of it in the cube, and every run time-major that compaction would make? Then it is as fast as it will be.
     pub fn is_settled(&self) -> bool {
         let Inner { places, cubes, .. } = &*self.0;
         let is_compact = |cube: &Cube| cube.runs().first_missing(cube.steps()).is_none();
@@ -240,6 +298,36 @@ impl Values {
         Ok(found)
     }
 
+    /// Blocks of a run of steps as they are stored, where the time-major copy holds all of these steps; they are decoded one
+    /// after the other, and none of them is copied. None where it does not.
+    ///
+    /// # Errors
+    /// As [`Values::cell`].
+    pub async fn encoded(
+        &self,
+        blocks: &[[u32; 2]],
+        steps: Range<usize>,
+    ) -> Result<Option<EncodedBlocks>, CubeError> {
+        if steps.start > steps.end || steps.end > self.0.places.len() {
+            return Err(self.outside(&format!("steps {steps:?}")));
+        }
+        let reads = self.reads(&steps);
+        let is_all = reads.maps.is_empty() && reads.fields.is_empty();
+        let mut runs = reads.runs.into_iter();
+        let (Some(((cube, run), pieces)), None, true) = (runs.next(), runs.next(), is_all) else {
+            return Ok(None);
+        };
+        let cube = self.0.cubes[cube].clone();
+        let content = cube.encoded(run, blocks).await?;
+        Ok(Some(EncodedBlocks {
+            cube,
+            run,
+            at: blocks.to_vec(),
+            content,
+            pieces,
+        }))
+    }
+
     fn outside(&self, what: &str) -> CubeError {
         let Manifest { grid, steps, .. } = &*self.0.manifest;
         CubeError::Outside {
@@ -292,22 +380,27 @@ impl Values {
         let reads = self.reads(&steps);
         let asked: Vec<[u32; 2]> = blocks.iter().map(|block| block.at).collect();
         let windows: Vec<Window> = blocks.iter().map(|block| block.window).collect();
-        let mut parts = vec![];
-        for (cube, run) in reads.runs.keys() {
-            parts.extend(
-                (0..)
-                    .zip(&asked)
-                    .map(|(number, at)| (*cube, *run, number, *at)),
-            );
-        }
-        let read = |(cube, run, number, at): (usize, usize, usize, [u32; 2])| async move {
-            let values = cubes[cube].block(run, at).await?;
-            Ok::<_, CubeError>(((cube, run), number, values))
+        let asked = &asked;
+        let read = |((cube, run), pieces): ((usize, usize), Vec<Piece>)| async move {
+            let content = cubes[cube].encoded(run, asked).await?;
+            Ok::<_, CubeError>((cube, run, pieces, content))
         };
-        let mut found = stream::iter(parts).map(read).buffered(BLOCKS_AT_ONCE);
-        while let Some((run, number, values)) = found.try_next().await? {
-            if let Some(values) = values {
-                blocks[number].put_run(&values, &reads.runs[&run], steps.len());
+        let mut found = stream::iter(reads.runs).map(read).buffered(RUNS_AT_ONCE);
+        while let Some((cube, run, pieces, content)) = found.try_next().await? {
+            let encoded = EncodedBlocks {
+                cube: cubes[cube].clone(),
+                run,
+                at: asked.clone(),
+                content,
+                pieces,
+            };
+            // A few ten microseconds a block: not worth another thread.
+            let put = |number: usize, values: &[f32]| {
+                blocks[number].put_run(values, &encoded.pieces, steps.len());
+                true
+            };
+            if let Err(undecoded) = encoded.each(put) {
+                return Err(encoded.error(undecoded).await);
             }
         }
         let windows = &windows;

@@ -208,7 +208,7 @@ impl Check<'_> {
             }
         }
         for run in fresh_runs {
-            let mut steps = series::steps_of(run);
+            let mut steps = series::steps_of(run, cube.steps());
             // Told of already, by the objects of its steps or its own.
             if broken.runs.contains(&(run as u32))
                 || steps.any(|step| broken.steps.contains(&(step as u32)))

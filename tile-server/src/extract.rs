@@ -12,8 +12,8 @@ use serde::de::{DeserializeOwned, Deserializer, Error as _, IgnoredAny, MapAcces
 
 use crate::error::ServerError;
 
-/// Longest query that is taken apart, bytes: the longest real one has three lists of 16 stops, every sign escaped.
-const MAX_QUERY_BYTES: usize = 4096;
+/// Longest query that is taken apart, bytes: the longest real one is a line of 500 vertices, every sign escaped.
+const MAX_QUERY_BYTES: usize = 16 << 10;
 
 /// The parts of the path.
 #[derive(Debug)]

@@ -2,8 +2,8 @@
 
 use super::fixed::{AREA_DECIMALS, MASS_DECIMALS, OutOfRange, to_steps};
 
-const MASS_STEPS_PER_KG: f64 = 10u64.pow(MASS_DECIMALS) as f64;
-const AREA_STEPS_PER_M2: f64 = 10u64.pow(AREA_DECIMALS) as f64;
+pub(crate) const MASS_STEPS_PER_KG: f64 = 10u64.pow(MASS_DECIMALS) as f64;
+pub(crate) const AREA_STEPS_PER_M2: f64 = 10u64.pow(AREA_DECIMALS) as f64;
 
 /// Mass that leaves the sea through a chunk: the sum over cells of flux x area x seconds.
 ///

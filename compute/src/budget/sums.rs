@@ -137,7 +137,7 @@ pub(crate) async fn of_steps(
     Ok(RegionSums {
         steps: match known {
             Some(sums) => sums,
-            None => asked(engine, steps, &region, measure).await?,
+            None => asked(engine, manifest, steps, &region, measure).await?,
         },
         sea_steps: region.sea_steps,
         on_grid_m2: region.on_grid_m2,
@@ -175,7 +175,7 @@ pub async fn store(
     if computed_count > 0 {
         let stored = RegionAddress::stored(store, weights.clone());
         let region = WeighedRegion::read(engine, &manifest.grid, &stored).await?;
-        let sums = asked(engine, &unknown, &region, measure).await?;
+        let sums = asked(engine, manifest, &unknown, &region, measure).await?;
         known.extend(unknown.iter().zip(sums).map(|(step, sum)| {
             let row = row_of(&step.field, &sum);
             (step.field.clone(), row)
@@ -206,7 +206,7 @@ pub(crate) async fn verify(
     let steps: Vec<&Step> = manifest.steps.iter().collect();
     let stored = RegionAddress::stored(engine.store(), weights.clone());
     let region = WeighedRegion::read(engine, &manifest.grid, &stored).await?;
-    let sums = asked(engine, &steps, &region, measure).await?;
+    let sums = asked(engine, manifest, &steps, &region, measure).await?;
     let rows = steps
         .iter()
         .zip(&sums)

@@ -37,19 +37,6 @@ impl<'a, T: ArrowPrimitiveType> Lists<'a, T> {
     }
 }
 
-/// Rows of two lists side by side, which must be equally long.
-pub(crate) fn same_length<'a, A, B>(
-    function: &str,
-    a: &'a [A],
-    b: &'a [B],
-) -> Result<(&'a [A], &'a [B])> {
-    if a.len() == b.len() {
-        Ok((a, b))
-    } else {
-        exec_err!("{function}: {} values for {} areas", a.len(), b.len())
-    }
-}
-
 /// Checks the types of arguments: `expected` holds the item type of a list or the type itself.
 pub(crate) fn check_types(function: &str, found: &[DataType], expected: &[Argument]) -> Result<()> {
     let fits = |(found, expected): (&DataType, &Argument)| match (found, expected) {

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 
 use super::bytes::Reader;
 use super::histogram::Histograms;
+use super::region_sums::RegionStepSums;
 use crate::ComputeError;
 
 /// Sums of the values of a step.
@@ -68,6 +69,8 @@ pub(crate) struct Accumulated {
     pub(super) steps: BTreeMap<u32, StepSums>,
     /// Weights by ranges of values.
     pub(super) histograms: Histograms,
+    /// Sums over a region by the index of the step.
+    pub(super) regions: BTreeMap<u32, RegionStepSums>,
 }
 
 impl Accumulated {
@@ -78,6 +81,10 @@ impl Accumulated {
     pub(crate) fn merge(&mut self, other: Self) -> Result<(), ComputeError> {
         for (step, sums) in other.steps {
             let own = self.steps.entry(step).or_default();
+            own.merge(&sums).ok_or_else(too_large)?;
+        }
+        for (step, sums) in other.regions {
+            let own = self.regions.entry(step).or_default();
             own.merge(&sums).ok_or_else(too_large)?;
         }
         self.histograms
@@ -99,6 +106,11 @@ impl Accumulated {
             out.extend(sums.max.to_le_bytes());
         }
         self.histograms.write(&mut out);
+        out.extend((self.regions.len() as u32).to_le_bytes());
+        for (step, sums) in &self.regions {
+            out.extend(step.to_le_bytes());
+            sums.write(&mut out);
+        }
         out
     }
 
@@ -123,6 +135,10 @@ impl Accumulated {
                 all.steps.insert(step, sums);
             }
             all.histograms = Histograms::read(reader)?;
+            for _ in 0..reader.u32()? {
+                let step = reader.u32()?;
+                all.regions.insert(step, RegionStepSums::read(reader)?);
+            }
             reader.is_empty().then_some(all)
         };
         read(&mut Reader::new(bytes))
@@ -154,6 +170,7 @@ mod tests {
         Accumulated {
             steps: BTreeMap::from([(step, sums)]),
             histograms: Histograms::default(),
+            regions: BTreeMap::new(),
         }
     }
 

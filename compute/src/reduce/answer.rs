@@ -74,7 +74,7 @@ pub async fn statistics_of(
 }
 
 /// The version along time; a cluster's executors read its fields instead.
-async fn opened(
+pub(super) async fn opened(
     engine: &Engine,
     manifest: &Manifest,
     id: &ManifestId,

@@ -8,6 +8,9 @@ use contract::grid::Grid;
 use cube::BLOCK_CELLS;
 use serde::{Deserialize, Serialize};
 
+use super::region_sums::CellArea;
+use super::scale::nearest;
+use crate::budget::bands::band_of;
 use crate::region::loaded::RegionWeights;
 
 /// Steps of the largest weight, as a power of two: a share of 1e-11 of a cell is told.
@@ -49,7 +52,8 @@ impl WeightUnit {
     /// The nearest number of steps, but at least one of what there is.
     fn steps(self, weight: f64) -> i64 {
         if weight > 0.0 {
-            ((weight / self.size()).round() as i64).max(1)
+            // A power of two: to multiply with the reciprocal is as exact.
+            nearest(weight * (1.0 / self.size())).max(1)
         } else {
             0
         }
@@ -95,6 +99,19 @@ fn shape_only([rows, cols]: Shape) -> Grid {
     }
 }
 
+/// Cells of a window as 8 x 8 of a block, wherever the grid ends: those beyond it have nothing of the geometry.
+pub(super) fn block<C: Copy + Default>(own: Vec<C>, window: Window) -> Vec<C> {
+    let (side, cols) = (BLOCK_CELLS as usize, window.cols as usize);
+    if own.len() == side * side {
+        return own;
+    }
+    let mut cells = vec![C::default(); side * side];
+    for (all, own) in cells.chunks_exact_mut(side).zip(own.chunks_exact(cols)) {
+        all[..cols].copy_from_slice(own);
+    }
+    cells
+}
+
 /// A geometry's weights on a grid.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Cells<'a> {
@@ -111,24 +128,42 @@ impl Cells<'_> {
     pub(super) fn window(&self, window: Window) -> Vec<CellWeight> {
         let mut cells = vec![CellWeight::default(); window.cell_count()];
         for (row, own) in (window.row..).zip(cells.chunks_exact_mut(window.cols as usize)) {
-            self.fill(self.whole, row, window.col, own, |cell, steps| {
-                cell.weight = steps;
+            self.fill(self.whole, row, window.col, own, |cell, weight| {
+                cell.weight = self.unit.steps(weight);
             });
-            self.fill(self.covered, row, window.col, own, |cell, steps| {
-                cell.covered = steps;
+            self.fill(self.covered, row, window.col, own, |cell, weight| {
+                cell.covered = self.unit.steps(weight);
+            });
+        }
+        cells
+    }
+
+    /// Areas of the cells of a window, row-major.
+    pub(super) fn areas(&self, window: Window, grid: &Grid) -> Vec<CellArea> {
+        let mut cells = vec![CellArea::default(); window.cell_count()];
+        for (row, own) in (window.row..).zip(cells.chunks_exact_mut(window.cols as usize)) {
+            let band = band_of(grid, row) as u8;
+            for cell in &mut *own {
+                cell.band = band;
+            }
+            self.fill(self.whole, row, window.col, own, |cell, area_m2| {
+                cell.whole_m2 = area_m2;
+            });
+            self.fill(self.covered, row, window.col, own, |cell, area_m2| {
+                cell.sea_m2 = area_m2;
             });
         }
         cells
     }
 
     /// Sets weights of a run of cells of a row.
-    fn fill(
+    fn fill<C>(
         &self,
         weights: &RegionWeights,
         row: u32,
         first_col: u32,
-        cells: &mut [CellWeight],
-        set: impl Fn(&mut CellWeight, i64),
+        cells: &mut [C],
+        set: impl Fn(&mut C, f64),
     ) {
         let chunks_across = self.shape[1].div_ceil(CHUNK_COLS);
         let mut col = first_col;
@@ -143,7 +178,7 @@ impl Cells<'_> {
                 let at = (row % CHUNK_ROWS) * width + col % CHUNK_COLS;
                 let own = &mut cells[(col - first_col) as usize..(run_end - first_col) as usize];
                 for (cell, area) in own.iter_mut().zip(&areas[at as usize..]) {
-                    set(cell, self.unit.steps(*area));
+                    set(cell, *area);
                 }
             }
             col = run_end;

@@ -1,25 +1,28 @@
 //! Array kernels: values of some cells at some steps and the cells' weights in, sums by step or histograms out.
 
+use std::ops::Range;
+
+use cube::BLOCK_CELLS;
+
 use super::accumulator::StepSums;
 use super::cells::CellWeight;
 use super::histogram::{Buckets, Histograms};
 use super::scale::{Scale, nearest};
 use crate::budget::fixed::OutOfRange;
 
-/// A block of values, `[cell, step]`, stored unit, NaN no data, and the cells' weights.
+/// Values of some cells, `[cell, step]`, stored unit, NaN no data.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Block<'a> {
+pub(super) struct Values<'a> {
     pub(super) values: &'a [f32],
     /// Steps of every cell.
     pub(super) step_count: usize,
-    /// Those that are summed, of them.
+    /// The first one that is summed, of them.
     pub(super) first: usize,
-    pub(super) cells: &'a [CellWeight],
 }
 
-impl Block<'_> {
+impl Values<'_> {
     /// Steps of a cell that are summed, as many as `count`.
-    fn steps(&self, cell: usize, count: usize) -> &[f32] {
+    pub(super) fn steps(&self, cell: usize, count: usize) -> &[f32] {
         let start = cell * self.step_count + self.first;
         &self.values[start..start + count]
     }
@@ -27,7 +30,9 @@ impl Block<'_> {
 
 /// Sums of cells of equal weight by step, before they are multiplied with it.
 #[derive(Debug, Default)]
-pub(super) struct Scratch {
+struct Equal {
+    weight: CellWeight,
+    cell_count: usize,
     counts: Vec<i64>,
     sums: Vec<i64>,
     squares: Vec<i64>,
@@ -35,8 +40,12 @@ pub(super) struct Scratch {
     maxs: Vec<f32>,
 }
 
-impl Scratch {
+/// Cells that are summed before they are multiplied: a value is below 2⁴⁵ steps, a square below 2⁵⁰.
+const MOST_CELLS: usize = 1 << 12;
+
+impl Equal {
     fn clear(&mut self, steps: usize) {
+        self.cell_count = 0;
         for sums in [&mut self.counts, &mut self.sums, &mut self.squares] {
             sums.clear();
             sums.resize(steps, 0);
@@ -49,6 +58,7 @@ impl Scratch {
 
     /// Adds a cell's run of steps.
     fn add(&mut self, values: &[f32], scale: Scale, with_squares: bool) {
+        self.cell_count += 1;
         let (zero, factor) = (scale.zero, scale.steps_per_value());
         let own = self.counts.iter_mut().zip(&mut self.sums);
         for ((count, sum), value) in own.zip(values) {
@@ -73,12 +83,11 @@ impl Scratch {
     }
 
     /// Adds what was added up to `out`, with the cells' weight.
-    fn flush(
-        &self,
-        weight: CellWeight,
-        scale: Scale,
-        out: &mut [StepSums],
-    ) -> Result<(), OutOfRange> {
+    fn flush(&mut self, scale: Scale, out: &mut [StepSums]) -> Result<(), OutOfRange> {
+        if self.cell_count == 0 {
+            return Ok(());
+        }
+        let CellWeight { weight, covered } = self.weight;
         for (step, own) in out.iter_mut().enumerate() {
             let count = self.counts[step];
             if count == 0 {
@@ -90,46 +99,98 @@ impl Scratch {
                     return Err(OutOfRange(value.into()));
                 }
             }
-            let weighed = |sum: i64| i128::from(sum) * i128::from(weight.weight);
+            let weighed = |sum: i64| i128::from(sum) * i128::from(weight);
             own.count += count.unsigned_abs();
             own.weight += weighed(count);
-            own.covered += i128::from(count) * i128::from(weight.covered);
+            own.covered += i128::from(count) * i128::from(covered);
             own.sum += weighed(self.sums[step]);
             own.squares += weighed(self.squares[step]);
             own.min = own.min.min(min);
             own.max = own.max.max(max);
         }
+        self.clear(out.len());
         Ok(())
     }
 }
 
-/// Adds a block to the sums of the steps that are summed.
+/// Rows of a block: cells side by side weigh the same, those of the next row do not.
+const ROWS: usize = BLOCK_CELLS as usize;
+
+/// Sums of some steps while cells are added.
 ///
 /// A value counts as the nearest step of its scale, times the whole number that its cell weighs: integers, so that the order
-/// of cells does not matter. Neighbours of equal weight are summed before they are multiplied.
-///
-/// # Errors
-/// A value beyond anything physical.
-pub(super) fn add_sums(
-    block: Block<'_>,
+/// of cells does not matter. Neighbours of equal weight are summed before they are multiplied, across blocks that lie
+/// side by side too.
+#[derive(Debug)]
+pub(super) struct Summing {
     scale: Scale,
     with_squares: bool,
-    scratch: &mut Scratch,
-    out: &mut [StepSums],
-) -> Result<(), OutOfRange> {
-    let mut cells = block.cells.iter().enumerate().peekable();
-    while let Some((cell, &weight)) = cells.next() {
-        if weight.weight == 0 {
-            continue;
+    out: Vec<StepSums>,
+    /// Steps that are being added to.
+    steps: Range<usize>,
+    rows: [Equal; ROWS],
+}
+
+impl Summing {
+    /// Of so many steps.
+    pub(super) fn new(steps: usize, scale: Scale, with_squares: bool) -> Self {
+        Self {
+            scale,
+            with_squares,
+            out: vec![StepSums::default(); steps],
+            steps: 0..0,
+            rows: Default::default(),
         }
-        scratch.clear(out.len());
-        scratch.add(block.steps(cell, out.len()), scale, with_squares);
-        while let Some((cell, _)) = cells.next_if(|(_, next)| **next == weight) {
-            scratch.add(block.steps(cell, out.len()), scale, with_squares);
-        }
-        scratch.flush(weight, scale, out)?;
     }
-    Ok(())
+
+    /// Adds cells, whose summed steps are these.
+    ///
+    /// # Errors
+    /// A value beyond anything physical.
+    pub(super) fn add(
+        &mut self,
+        values: Values<'_>,
+        cells: &[CellWeight],
+        steps: Range<usize>,
+    ) -> Result<(), OutOfRange> {
+        if self.steps != steps {
+            self.flush()?;
+            for row in &mut self.rows {
+                row.clear(steps.len());
+            }
+            self.steps = steps;
+        }
+        let (scale, with_squares) = (self.scale, self.with_squares);
+        let is_block = cells.len() == ROWS * ROWS;
+        for (cell, weight) in cells.iter().enumerate() {
+            if weight.weight == 0 {
+                continue;
+            }
+            let row = &mut self.rows[if is_block { cell / ROWS } else { 0 }];
+            if row.weight != *weight || row.cell_count == MOST_CELLS {
+                row.flush(scale, &mut self.out[self.steps.clone()])?;
+                row.weight = *weight;
+            }
+            row.add(values.steps(cell, self.steps.len()), scale, with_squares);
+        }
+        Ok(())
+    }
+
+    fn flush(&mut self) -> Result<(), OutOfRange> {
+        for row in &mut self.rows {
+            row.flush(self.scale, &mut self.out[self.steps.clone()])?;
+        }
+        Ok(())
+    }
+
+    /// The sums of all steps.
+    ///
+    /// # Errors
+    /// A value beyond anything physical.
+    pub(super) fn finish(mut self) -> Result<Vec<StepSums>, OutOfRange> {
+        self.flush()?;
+        Ok(self.out)
+    }
 }
 
 /// What a step adds to.
@@ -143,13 +204,14 @@ pub(super) struct Target {
 
 /// Adds a block's weights to histograms. None if a sum leaves 128 bits.
 pub(super) fn add_weights(
-    block: Block<'_>,
+    block: Values<'_>,
+    cells: &[CellWeight],
     targets: &[Target],
     ranges: &[Buckets],
     out: &mut Histograms,
 ) -> Option<()> {
     let count = targets.last().map_or(0, |last| last.step + 1);
-    for (cell, weight) in block.cells.iter().enumerate() {
+    for (cell, weight) in cells.iter().enumerate() {
         if weight.weight == 0 {
             continue;
         }

@@ -6,19 +6,23 @@ use std::sync::Arc;
 
 use contract::chunk::Window;
 use contract::digest::Digest;
+use contract::grid::Grid;
 use contract::key::ObjectKey;
 use contract::time::Period;
-use cube::BLOCK_CELLS;
+use cube::{BLOCK_CELLS, EncodedBlocks, RUN_STEPS, Undecoded};
 use serde::{Deserialize, Serialize};
 use storage::rows::Stored;
 use storage::{StorageError, fields};
 
-use super::accumulator::{Accumulated, StepSums, too_large};
-use super::cells::{self, Cells, Shape, WeightUnit};
+use super::accumulator::{Accumulated, too_large};
+use super::cells::{self, CellWeight, Cells, Shape, WeightUnit, block};
 use super::histogram::Buckets;
-use super::kernel::{Block, Scratch, Target, add_sums, add_weights};
+use super::kernel::{Summing, Target, Values, add_weights};
+use super::region_sums::{CellArea, RegionScratch, RegionStepSums};
 use super::scale::Scale;
 use crate::ComputeError;
+use crate::budget::Measure;
+use crate::budget::fixed::OutOfRange;
 use crate::objects::Objects;
 
 use crate::region::loaded::{RegionWeights, weights_failed};
@@ -61,6 +65,13 @@ pub(super) enum Wanted {
         ranges: Vec<Buckets>,
         /// By the index of a step, the ranges that it adds to and the time it has in each one's bin.
         steps: BTreeMap<u32, Vec<(u32, i64)>>,
+    },
+    /// Mass and area over a region and, by bands of latitude, its sea; the weights of coverage are those of the sea.
+    RegionSums {
+        /// Whose bands.
+        grid: Grid,
+        /// What is summed.
+        measure: Measure,
     },
 }
 
@@ -207,17 +218,44 @@ impl Worker {
         let places: Vec<[u32; 2]> = places.collect();
         let [start, end] =
             [piece.steps.start, piece.steps.end].map(|step| (piece.first_step + step) as usize);
-        // A task of its own: chunks are decompressed where they are read.
-        let read = tokio::spawn(async move { values.blocks(&places, start..end).await });
-        let blocks = read.await;
-        let blocks = blocks.map_err(|e| ComputeError::inconsistent("statistics", e))??;
-        let piece = Arc::new(piece);
-        let rows = Arc::clone(&piece);
-        self.beside(&piece, cells::blocks(shape), move |take| {
-            let mut own = rows.rows.iter().zip(&blocks);
-            own.try_for_each(|(row, block)| take(*row, &block.values))
-        })
-        .await
+        let encoded = values.encoded(&places, start..end).await?;
+        let Some(encoded) = encoded else {
+            return Err(ComputeError::inconsistent(piece.key.as_str(), NOT_OPENED));
+        };
+        let (worker, piece) = (self.clone(), Arc::new(piece));
+        let encoded = Arc::new(encoded);
+        let own = Arc::clone(&encoded);
+        let reduced = tokio::task::spawn_blocking(move || worker.reduced_blocks(&piece, &own));
+        let reduced = reduced.await;
+        match reduced.map_err(|e| ComputeError::inconsistent("statistics", e))? {
+            Ok(reduced) => reduced,
+            Err(undecoded) => Err(encoded.error(undecoded).await.into()),
+        }
+    }
+
+    /// Reduces blocks as they are decoded.
+    fn reduced_blocks(
+        &self,
+        piece: &Piece,
+        blocks: &EncodedBlocks,
+    ) -> Result<Result<Accumulated, ComputeError>, Undecoded> {
+        let windows = cells::blocks(self.question.shape);
+        let mut reduction = Reduction::of(self, piece);
+        let mut failed = None;
+        blocks.each(|number, values| {
+            let cells = self.cells_of(windows[piece.rows[number] as usize], true);
+            let added = blocks.pieces().iter().try_for_each(|run| {
+                let run_values = Values {
+                    values,
+                    step_count: RUN_STEPS,
+                    first: run.in_run,
+                };
+                reduction.add(run_values, &cells, run.asked..run.asked + run.count)
+            });
+            failed = added.err();
+            failed.is_none()
+        })?;
+        Ok(failed.map_or_else(|| reduction.accumulated(), Err))
     }
 
     /// Reduces rows on a thread of its own; `each` hands them over, `windows` are where they lie.
@@ -240,41 +278,144 @@ impl Worker {
         windows: &[Window],
         each: impl FnOnce(&mut Take<'_>) -> Result<(), ComputeError>,
     ) -> Result<Accumulated, ComputeError> {
-        let question = &*self.question;
+        let mut reduction = Reduction::of(self, piece);
+        let steps = piece.steps.start as usize..piece.steps.end as usize;
+        each(&mut |row: u32, values: &[f32]| {
+            let cells = self.cells_of(windows[row as usize], false);
+            let own = Values {
+                values,
+                step_count: steps.len(),
+                first: steps.start,
+            };
+            reduction.add(own, &cells, 0..steps.len())
+        })?;
+        reduction.accumulated()
+    }
+
+    /// What values of a piece's steps are multiplied with besides areas.
+    fn seconds(&self, piece: &Piece) -> Vec<f64> {
+        let Wanted::RegionSums { measure, .. } = self.question.wanted else {
+            return vec![];
+        };
+        match (piece.layout, &self.values) {
+            (Layout::Field(period), _) => vec![measure.seconds(period)],
+            (Layout::Blocks, Some(values)) => {
+                let first = piece.first_step as usize;
+                let all = first + piece.steps.start as usize..first + piece.steps.end as usize;
+                let steps = &values.manifest().steps[all];
+                steps.iter().map(|step| measure.seconds(step.period)).collect()
+            }
+            (Layout::Blocks, None) => vec![],
+        }
+    }
+
+    /// What the cells of a window have of the geometry, of a block as of 8 x 8 cells wherever the grid ends.
+    fn cells_of(&self, window: Window, is_block: bool) -> CellShares {
         let cells = Cells {
-            shape: question.shape,
+            shape: self.question.shape,
             whole: &self.whole,
             covered: &self.covered,
-            unit: question.unit,
+            unit: self.question.unit,
         };
-        let (scale, step_count) = (question.scale, piece.steps.len());
-        let targets = piece.targets(&question.wanted);
-        let mut scratch = Scratch::default();
-        let mut sums = vec![StepSums::default(); piece.steps.len()];
-        let mut all = Accumulated::default();
-        each(&mut |row: u32, values: &[f32]| {
-            let cells = cells.window(windows[row as usize]);
-            let block = Block {
-                values,
-                step_count,
-                first: piece.steps.start as usize,
-                cells: &cells,
-            };
-            match &question.wanted {
-                Wanted::Sums { with_squares } => {
-                    let added = add_sums(block, scale, *with_squares, &mut scratch, &mut sums);
-                    added.map_err(|e| ComputeError::inconsistent(piece.key.as_str(), e))
-                }
-                Wanted::Histograms { ranges, .. } => {
-                    let added = add_weights(block, &targets, ranges, &mut all.histograms);
-                    added.ok_or_else(too_large)
-                }
+        match &self.question.wanted {
+            Wanted::RegionSums { grid, .. } => {
+                let areas = cells.areas(window, grid);
+                CellShares::Areas(if is_block { block(areas, window) } else { areas })
             }
-        })?;
-        let first = piece.first_step + piece.steps.start;
-        let own = (first..).zip(sums).filter(|(_, sums)| sums.count > 0);
-        all.steps.extend(own);
-        Ok(all)
+            Wanted::Sums { .. } | Wanted::Histograms { .. } => {
+                let weights = cells.window(window);
+                CellShares::Weights(if is_block { block(weights, window) } else { weights })
+            }
+        }
+    }
+}
+
+/// What cells have of a geometry, row by row.
+enum CellShares {
+    Weights(Vec<CellWeight>),
+    Areas(Vec<CellArea>),
+}
+
+/// What is accumulated of a piece.
+struct Reduction<'a> {
+    question: &'a Question,
+    piece: &'a Piece,
+    targets: Vec<Target>,
+    sums: Option<Summing>,
+    regions: Vec<RegionStepSums>,
+    /// Of each step what its values are multiplied with besides the area; nothing where no sums over a region are wanted.
+    seconds: Vec<f64>,
+    all: Accumulated,
+}
+
+impl<'a> Reduction<'a> {
+    fn of(worker: &'a Worker, piece: &'a Piece) -> Self {
+        let seconds = worker.seconds(piece);
+        let is_of_region = matches!(worker.question.wanted, Wanted::RegionSums { .. });
+        let steps = piece.steps.len();
+        let sums = match worker.question.wanted {
+            Wanted::Sums { with_squares } => {
+                Some(Summing::new(steps, worker.question.scale, with_squares))
+            }
+            Wanted::Histograms { .. } | Wanted::RegionSums { .. } => None,
+        };
+        Self {
+            seconds,
+            question: &worker.question,
+            piece,
+            targets: piece.targets(&worker.question.wanted),
+            sums,
+            regions: vec![RegionStepSums::default(); if is_of_region { steps } else { 0 }],
+            all: Accumulated::default(),
+        }
+    }
+
+    /// Adds values whose summed steps are `steps` of the piece, counted from its first summed one.
+    fn add(
+        &mut self,
+        values: Values<'_>,
+        cells: &CellShares,
+        steps: Range<usize>,
+    ) -> Result<(), ComputeError> {
+        let refused = |e: OutOfRange| ComputeError::inconsistent(self.piece.key.as_str(), e);
+        match (&self.question.wanted, cells) {
+            (Wanted::Sums { .. }, CellShares::Weights(cells)) => match &mut self.sums {
+                Some(sums) => sums.add(values, cells, steps).map_err(refused),
+                None => Ok(()),
+            },
+            (Wanted::Histograms { ranges, .. }, CellShares::Weights(cells)) => {
+                let own = self.targets.iter().filter(|it| steps.contains(&it.step));
+                let own = own.map(|it| Target {
+                    step: it.step - steps.start,
+                    ranges: it.ranges.clone(),
+                });
+                let own: Vec<Target> = own.collect();
+                let added = add_weights(values, cells, &own, ranges, &mut self.all.histograms);
+                added.ok_or_else(too_large)
+            }
+            (Wanted::RegionSums { .. }, CellShares::Areas(cells)) => {
+                let (seconds, sums) = (&self.seconds[steps.clone()], &mut self.regions[steps]);
+                let mut scratch = RegionScratch::new(seconds.len());
+                scratch.add(values, cells, seconds, sums).map_err(refused)
+            }
+            _ => Err(ComputeError::inconsistent(
+                self.piece.key.as_str(),
+                "its cells are not what is summed",
+            )),
+        }
+    }
+
+    fn accumulated(mut self) -> Result<Accumulated, ComputeError> {
+        let first = self.piece.first_step + self.piece.steps.start;
+        if let Some(sums) = self.sums {
+            let sums = sums.finish();
+            let sums =
+                sums.map_err(|e| ComputeError::inconsistent(self.piece.key.as_str(), e))?;
+            let own = (first..).zip(sums);
+            self.all.steps.extend(own.filter(|(_, sums)| sums.count > 0));
+        }
+        self.all.regions.extend((first..).zip(self.regions));
+        Ok(self.all)
     }
 }
 

@@ -15,8 +15,6 @@ const HELD_BYTES: u64 = 256 << 20;
 /// Regions held, a guess that sizes tables. For so few the cache is one shard: in several, each would have a part of the room
 /// that large weights do not fit into.
 const HELD_REGIONS: usize = 32;
-/// Runs of chunks that a predicate names at most.
-const MAX_RUNS: usize = 16;
 
 /// Areas of a region's share of every cell, m², by chunk.
 #[derive(Debug)]
@@ -51,40 +49,10 @@ impl RegionWeights {
             .map(|(chunk, areas)| (*chunk, areas.as_slice()))
     }
 
-    /// Runs of chunk numbers, `(first, last)`, that hold every chunk of the region and as few others as so few runs can.
-    pub(crate) fn runs(&self) -> Vec<(u32, u32)> {
-        runs(self.chunks.iter().map(|(chunk, _)| *chunk), MAX_RUNS)
-    }
-
     fn size_bytes(&self) -> u64 {
         let areas = self.chunks.iter().map(|(_, areas)| areas.len() as u64);
         areas.sum::<u64>() * size_of::<f64>() as u64
     }
-}
-
-fn runs(chunks: impl Iterator<Item = u32>, max_runs: usize) -> Vec<(u32, u32)> {
-    let mut runs: Vec<(u32, u32)> = vec![];
-    for chunk in chunks {
-        match runs.last_mut() {
-            Some((_, last)) if chunk <= *last + 1 => *last = chunk,
-            _ => runs.push((chunk, chunk)),
-        }
-    }
-    // The narrowest gaps are closed first: what lies in them is read in vain.
-    let mut gaps: Vec<u32> = runs.windows(2).map(|pair| pair[1].0 - pair[0].1).collect();
-    gaps.sort_unstable();
-    let closed = runs.len().saturating_sub(max_runs);
-    let Some(&widest) = closed.checked_sub(1).and_then(|last| gaps.get(last)) else {
-        return runs;
-    };
-    let mut joined: Vec<(u32, u32)> = vec![];
-    for run in runs {
-        match joined.last_mut() {
-            Some((_, last)) if run.0 - *last <= widest => *last = run.1,
-            _ => joined.push(run),
-        }
-    }
-    joined
 }
 
 /// Weights that this process has read.
@@ -147,19 +115,6 @@ mod tests {
         let weights = RegionWeights::new(vec![(7, vec![1.0]), (3, vec![2.0, 0.5])]);
         assert_eq!(weights.areas_m2(3), Some(&[2.0, 0.5][..]));
         assert_eq!(weights.areas_m2(5), None);
-        assert_eq!(weights.runs(), [(3, 3), (7, 7)]);
-    }
-
-    #[test]
-    fn neighbours_are_one_run_and_the_narrowest_gaps_are_closed() {
-        let chunks = [0, 1, 2, 10, 11, 13, 40];
-        assert_eq!(
-            runs(chunks.into_iter(), 4),
-            [(0, 2), (10, 11), (13, 13), (40, 40)]
-        );
-        assert_eq!(runs(chunks.into_iter(), 3), [(0, 2), (10, 13), (40, 40)]);
-        assert_eq!(runs(chunks.into_iter(), 1), [(0, 40)]);
-        assert!(runs([].into_iter(), 1).is_empty());
     }
 
     #[tokio::test]

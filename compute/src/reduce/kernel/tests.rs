@@ -25,21 +25,64 @@ fn values() -> Vec<f32> {
     (0..cells().len() * STEPS).map(value).collect()
 }
 
-fn block<'a>(values: &'a [f32], cells: &'a [CellWeight]) -> Block<'a> {
-    Block {
+fn block(values: &[f32]) -> Values<'_> {
+    Values {
         values,
         step_count: STEPS,
         first: 1,
-        cells,
     }
 }
 
 fn sums(values: &[f32], cells: &[CellWeight]) -> Result<Vec<StepSums>, OutOfRange> {
-    let mut out = vec![StepSums::default(); 3];
     let scale = Scale::of(Quantity::CarbonFlux).unwrap();
-    let mut scratch = Scratch::default();
-    add_sums(block(values, cells), scale, true, &mut scratch, &mut out)?;
-    Ok(out)
+    let mut summing = Summing::new(3, scale, true);
+    summing.add(block(values), cells, 0..3)?;
+    summing.finish()
+}
+
+#[test]
+fn blocks_side_by_side_and_runs_in_pieces_have_the_sums_of_their_cells() {
+    let weight = |cell: usize| match cell % 8 {
+        7 => 1 << 30,
+        _ => 1000 + (cell / 8) as i64,
+    };
+    let cells: Vec<CellWeight> = (0..64)
+        .map(|cell| CellWeight {
+            weight: weight(cell),
+            covered: weight(cell) / 2,
+        })
+        .collect();
+    let values = |block: usize| -> Vec<f32> {
+        let value = |at: usize| ((at * 7919 + block * 31) % 1009) as f32 * 1e-11;
+        (0..64 * STEPS).map(value).collect()
+    };
+    let scale = Scale::of(Quantity::CarbonFlux).unwrap();
+    let mut together = Summing::new(4, scale, true);
+    let mut one_by_one = vec![StepSums::default(); 4];
+    for number in 0..5 {
+        let values = values(number);
+        let from = |first: usize| Values {
+            first,
+            ..block(&values)
+        };
+        // The first step stands elsewhere in the run than the other three.
+        together.add(from(4), &cells, 0..1).unwrap();
+        together.add(from(1), &cells, 1..4).unwrap();
+        for (cell, weight) in cells.iter().enumerate() {
+            let mut alone = Summing::new(4, scale, true);
+            let own = Values {
+                values: &values[cell * STEPS..][..STEPS],
+                step_count: STEPS,
+                first: 4,
+            };
+            alone.add(own, &[*weight], 0..1).unwrap();
+            alone.add(Values { first: 1, ..own }, &[*weight], 1..4).unwrap();
+            for (sum, more) in one_by_one.iter_mut().zip(alone.finish().unwrap()) {
+                sum.merge(&more).unwrap();
+            }
+        }
+    }
+    assert_eq!(together.finish().unwrap(), one_by_one);
 }
 
 #[test]
@@ -129,7 +172,8 @@ fn histograms_hold_the_weight_of_every_value_in_their_range() {
         },
     ];
     let mut out = Histograms::default();
-    add_weights(block(&values, &cells), &targets, &[all, positive], &mut out).unwrap();
+    let ranges = [all, positive];
+    add_weights(block(&values), &cells, &targets, &ranges, &mut out).unwrap();
     let weight = |step: usize, is_in: &dyn Fn(f32) -> bool| -> i128 {
         let at = |cell: usize| values[cell * STEPS + 1 + step];
         let own = (0..cells.len()).filter(|cell| is_in(at(*cell)));
