@@ -19,7 +19,7 @@ use crate::stages::interpolate::params::InterpolateParams;
 use crate::stages::layout::{Col, LIGHT_OFF, Row, VIEW_GLOBE};
 use crate::stages::params::Params;
 
-/// Light texels at most, the side of their square: 64 slices of them are 27 MB.
+/// Light texels at most, the side of their square: 192 layers of them are 79 MB.
 const MOST_LIGHT_TEXELS: f64 = 320.0;
 /// The same over a region, whose light does not reach round half the globe. Finer texels are hardly better and slower,
 /// because neighbours share fewer: 4.5 M particles take 0.823, 0.833, 0.847 and 0.97 ms with 160, 192, 224 and 320.
