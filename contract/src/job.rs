@@ -18,7 +18,7 @@ use crate::trails::{TRAILS_PER_CELL, Trails};
 
 /// Raised whenever the renderer draws the same job differently or writes the same picture in other bytes, so that old
 /// pictures are not taken for new ones: a name has one content for ever. `make bless` asks for it.
-pub const RENDERER_VERSION: u32 = 9;
+pub const RENDERER_VERSION: u32 = 10;
 /// Largest width and height of a picture, pixels.
 pub const MAX_IMAGE_PX: u32 = 7680;
 /// Most pixels of a picture: as many as 8K has (7680 x 4320).

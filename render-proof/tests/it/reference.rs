@@ -87,7 +87,12 @@ fn more_slices_come_nearer_to_the_reference_on_a_globe_and_on_a_tile() {
     let scene = ocean(ONE_DEGREE);
     let renderer = twins();
     let views = [
-        ("globe", globe(-150.0, 0.0, 4.0e6, 64), 44.0),
+        // Aslant: from straight above eight slices will do, as the light's layers are its own.
+        (
+            "globe",
+            looking_at([-122.0, 27.0], 2.2e6, [150.0, 60.0], 64),
+            46.0,
+        ),
         ("tile", tile(3, 1, 3, 256), 49.0),
     ];
     for (name, view, least_db) in views {
@@ -100,7 +105,7 @@ fn more_slices_come_nearer_to_the_reference_on_a_globe_and_on_a_tile() {
         }
         let [eight, usual, many] = [0, 1, 2].map(|i| rows[i].difference);
         assert!(usual.psnr_db.unwrap() >= least_db, "{name}: {usual:?}");
-        // Few slices are far off; from 64 on what is left is that a cloud has one colour and few looks at the light, however many there are.
+        // Few slices are far off; from 64 on what is left does not come from slices, however many there are.
         let [few_db, usual_db, many_db] = [eight, usual, many].map(|d| d.psnr_db.unwrap());
         assert!(
             few_db < usual_db - 3.0 && many_db > usual_db - 3.0,
@@ -116,14 +121,14 @@ fn more_slices_come_nearer_to_the_reference_on_a_globe_and_on_a_tile() {
 #[test]
 fn from_any_side_the_volume_is_near_the_reference() {
     let scene = ocean(ONE_DEGREE);
-    // Slices stand askew to the sheet: at 64 it is farther off than from above (docs/performance-quality.md).
+    // Slices stand askew to the sheet (docs/performance-quality.md).
     for (target, distance_m, angles, least_db) in [
-        ([-122.0, 27.0], 2.2e6, [0.0, 45.0], 34.0),
-        ([-122.0, 27.0], 2.2e6, [150.0, 60.0], 28.8),
-        ([-150.0, 0.0], 3.0e6, [-45.0, 75.0], 34.4),
+        ([-122.0, 27.0], 2.2e6, [0.0, 45.0], 45.0),
+        ([-122.0, 27.0], 2.2e6, [150.0, 60.0], 49.0),
+        ([-150.0, 0.0], 3.0e6, [-45.0, 75.0], 51.0),
         // Against the sun and with it, the limb in sight.
-        ([-150.0, 0.0], 6.0e6, [135.0, 50.0], 38.2),
-        ([-150.0, 0.0], 6.0e6, [-45.0, 50.0], 36.0),
+        ([-150.0, 0.0], 6.0e6, [135.0, 50.0], 48.0),
+        ([-150.0, 0.0], 6.0e6, [-45.0, 50.0], 46.0),
     ] {
         let job = job(Mode::Volume, looking_at(target, distance_m, angles, 96));
         let truth = reference(&job, &scene, Fineness::default()).unwrap();
@@ -141,8 +146,8 @@ fn from_below_the_sea_the_volume_is_near_the_reference() {
     let scene = ocean(ONE_DEGREE);
     // From under sources of the tropics, at the sinks of middle latitudes and at what stands on the surface.
     for (place, depth_m, [heading_deg, tilt_deg], least_db) in [
-        ([-128.0, 8.0], 3e5, [0.0, 95.0], 35.0),
-        ([-150.0, 2.0], 6e5, [200.0, 105.0], 35.0),
+        ([-128.0, 8.0], 3e5, [0.0, 95.0], 51.0),
+        ([-150.0, 2.0], 6e5, [200.0, 105.0], 51.0),
         ([-128.0, 8.0], 4e5, [20.0, 60.0], 35.0),
     ] {
         let [lon_deg, lat_deg] = place;

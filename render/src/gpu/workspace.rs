@@ -55,7 +55,7 @@ impl Slot {
             Self::Velocity => "velocities",
             Self::Seen => "splats on the screen",
             Self::Lit => "splats in the light",
-            Self::Light => "light slices",
+            Self::Light => "light layers",
             Self::Counts => "list counts",
             Self::BlockSums => "scan sums",
             Self::HotLists => "long lists",

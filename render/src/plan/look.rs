@@ -29,21 +29,25 @@ pub(super) const LOWEST_SUN_DEG: f64 = 20.0;
 /// particle's own kernel does (variance texel²/3 against radius²/8).
 pub(super) const TEXEL_PER_RADIUS: f64 = 0.612;
 
-/// Power of the light below where slices are thin: on globes, and where the eye looks straight down on a map.
-pub(super) const LOOK_POWER_GLOBE: f64 = 0.25;
-/// See [`LOOK_POWER_GLOBE`].
-pub(super) const LOOK_POWER_TILE: f64 = 0.0;
-/// What is added to it where a particle's radius is a slice.
+/// Light layer over particle radius: giving to the two nearest layers and summing half of its own blurs by half a layer
+/// squared, the particle's own kernel by radius²/8.
+pub(super) const LAYER_PER_RADIUS: f64 = 0.5;
+
+/// Power of the light by which what is seen of it counts on globes where sun and eye stand equally high: of two places one
+/// behind the other, so much deeper is the farther one in what dims the eye's sight than in what dims the light. Elsewhere
+/// it is that times the sine of the sun's height over the eye's.
+pub(super) const LOOK_POWER_GLOBE: f64 = 1.0 / LIGHT_DEPTH;
+/// What is added to it on map tiles where a particle's radius is a slice.
 const LOOK_POWER_OF_A_SLICE: f64 = 3.6;
 /// More is nowhere nearer to the reference.
 const MOST_LOOK_POWER: f64 = 2.0;
 
-/// How much more of what is lit is seen than of what is dark, as a power of the light, for particles with a radius of so
-/// many slices. Where slices are thin, blending one after the other says what is seen; of what lies in one slice nothing
-/// else does. Fitted to six scenes with 16 to 256 slices (docs/performance-quality.md).
-pub(super) fn look_power(thin: f64, radius_slices: f64) -> f32 {
+/// How much more of what is lit is seen than of what is dark on map tiles, as a power of the light, for particles with a
+/// radius of so many slices. Where slices are thin, blending one after the other says what is seen; of what lies in one
+/// slice nothing else does. Fitted to scenes with 16 to 256 slices (docs/performance-quality.md).
+pub(super) fn look_power_tile(radius_slices: f64) -> f32 {
     let thick = LOOK_POWER_OF_A_SLICE / radius_slices.max(1e-3).powf(2.5);
-    (thin + thick).min(MOST_LOOK_POWER) as f32
+    thick.min(MOST_LOOK_POWER) as f32
 }
 
 /// Clouds that overlap at a place: the fewer, the grainier; the more, the slower.

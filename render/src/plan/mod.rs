@@ -384,6 +384,11 @@ fn lighting(job: &RenderJob) -> LightParams {
         } else {
             LIGHT_OFF
         },
+        // Map tiles have the layers of the eye's slices.
+        layers: job.style.slices,
+        part: 1.0,
+        sunward_per_slice: 1.0,
+        deeper: 1.0,
         ambient: look::AMBIENT,
         direct: look::DIRECT,
         night: if job.style.sun.subsolar.is_some() {

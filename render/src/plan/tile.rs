@@ -259,7 +259,7 @@ fn light_and_reach(
     projection.light_shift_per_m = DVec2::from(shadow_per_m).as_vec2();
     let slices_per_unit = f64::from(projection.slices_per_unit);
     let radius_slices = radius_px / level.px_per_m * slices_per_unit;
-    lighting.look_power = look::look_power(look::LOOK_POWER_TILE, radius_slices);
+    lighting.look_power = look::look_power_tile(radius_slices);
     let toward_slice = -slices_per_unit / level.px_per_m;
     lighting.toward = DVec2::from(toward_eye).extend(toward_slice).as_vec3();
     let texel_px = unit / subpixels;

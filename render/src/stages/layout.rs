@@ -32,6 +32,20 @@ pub const SCAN_BLOCK: u32 = GROUP * 8;
 /// three points (5/9 at the centre, 2/9 at the root of 3/8) are 1.4 dB nearer on a coast, 0.3 dB on the equator, and
 /// cost 0.05 ms of a frame of 4.5 M particles.
 pub const LOOK: f32 = 0.34;
+/// Radii from its centre, across the sight line and along the vertical as it is seen, at which a cloud on a globe looks its
+/// light up as well: what lies farther out is lit as the line through these two says.
+pub const ASIDE: f32 = 0.4;
+/// Sine of the angle between sight line and vertical from which on light may rise across a cloud as steeply as it is found to.
+pub const LEAST_SINE: f32 = 0.05;
+/// Square of its cosine from which on `LightParams::look_power` is what the angles say: where the eye looks along the sheet,
+/// what lies before and behind a cloud is lit alike.
+pub const LEAST_COSINE_SQ: f32 = 0.01;
+/// Largest power of the light by which what is seen of it counts: more shows in no picture.
+pub const MOST_POWER: f32 = 4.0;
+/// Beyond this optical depth nothing is seen; single precision ends not far above it.
+pub const MOST_EXPONENT: f32 = 60.0;
+/// Parts that the slope of a cloud's light is counted in.
+pub const SLOPE_ONE: f32 = 160.0;
 /// What stands for "no data" in grids: NaN is not reliable in shaders.
 pub const MISSING: f32 = -1.0e30;
 
@@ -154,6 +168,9 @@ shared_struct! {
         pub colour: u32,
         /// 1: farther than `ProjectParams::beyond_m` beyond the sea surface.
         pub is_beyond: u32,
+        /// How much brighter it is a radius farther up in the picture, of the earth, than in its middle: in [`SLOPE_ONE`]
+        /// parts, -127 to 127. Found when it is dimmed; devices store none.
+        pub slope: i32,
     }
 }
 
@@ -165,7 +182,7 @@ shared_struct! {
         pub place: u32,
         /// Radius in the same unit in the low 15 bits, then [`BEYOND_BIT`], optical depth at the centre times `depth_one` of the lists in the high.
         pub size: u32,
-        /// Red, green, blue, slice; 8 bits each, red lowest.
+        /// Red, green, blue, and the slope of its light and 128; 8 bits each, red lowest.
         pub colour: u32,
     }
 }

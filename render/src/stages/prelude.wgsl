@@ -37,7 +37,7 @@ struct Particle {
 }
 struct Splat {
     x_sub: i32, y_sub: i32, radius_px: f32, tau: f32, slice: f32, light_u: i32, light_v: i32, light_depth: f32,
-    day: f32, colour: u32, is_beyond: u32,
+    day: f32, colour: u32, is_beyond: u32, slope: i32,
 }
 struct Entry {
     place: u32, size: u32, colour: u32,
@@ -63,6 +63,7 @@ const PART_ENTRIES: u32 = 1024u;
 const MOST_HOT_PARTS: u32 = 4096u;
 const NO_LIST: u32 = 0xffffffffu;
 const COVERED: u32 = 16777216u;
+const SLOPE_ONE: f32 = 160.0;
 const MISSING: f32 = -1.0e30;
 const WATER_RED: f32 = 0.0031;
 const WATER_GREEN: f32 = 0.0174;

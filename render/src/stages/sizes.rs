@@ -30,10 +30,10 @@ pub fn list_count(params: &Params) -> u32 {
     params.view.tiles.element_product() * params.view.slices
 }
 
-/// Numbers in the light buffer: one layer for every slice and one for the whole.
+/// Numbers in the light buffer: its layers and one for the whole.
 pub fn texel_count(params: &Params) -> usize {
     let [width, height] = params.lighting.size.to_array().map(|side| side as usize);
-    width * height * (params.view.slices as usize + 1)
+    width * height * (params.lighting.layers as usize + 1)
 }
 
 /// Bytes of the light buffer; of one that is bound but never read if particles are not lit.

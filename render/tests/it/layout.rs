@@ -9,11 +9,11 @@ use render::stages::fill::level::{FillLevel, MOST_REACH_COLS};
 use render::stages::fill::{self, exact, window};
 use render::stages::isolines::params::Isoline;
 use render::stages::layout::{
-    Axis, BEYOND_BIT, COVERED, Col, Entry, GROUP, GroundAxis, KERNEL_BALL, KERNEL_CLOUD,
-    KERNEL_DOT, KERNEL_RIMMED, LIGHT_ALONE, LIGHT_GIVEN, LIGHT_OFF, LIGHT_OWN, LOOK, MISSING,
-    MOST_HOT_PARTS, NO_LIST, PART_ENTRIES, Particle, RADIUS_BITS, Row, SCREEN_TILE_PX,
-    SCREEN_TILE_SHIFT, SQUARE, SUBPIXELS, Splat, VIEW_GLOBE, VIEW_TILE, Velocity, WATER_BLUE,
-    WATER_GREEN, WATER_RED,
+    ASIDE, Axis, BEYOND_BIT, COVERED, Col, Entry, GROUP, GroundAxis, KERNEL_BALL, KERNEL_CLOUD,
+    KERNEL_DOT, KERNEL_RIMMED, LEAST_COSINE_SQ, LEAST_SINE, LIGHT_ALONE, LIGHT_GIVEN, LIGHT_OFF,
+    LIGHT_OWN, LOOK, MISSING, MOST_EXPONENT, MOST_HOT_PARTS, MOST_POWER, NO_LIST, PART_ENTRIES,
+    Particle, RADIUS_BITS, Row, SCREEN_TILE_PX, SCREEN_TILE_SHIFT, SLOPE_ONE, SQUARE, SUBPIXELS,
+    Splat, VIEW_GLOBE, VIEW_TILE, Velocity, WATER_BLUE, WATER_GREEN, WATER_RED,
 };
 use render::stages::params::{Fields, Params};
 use render::stages::{bin, compose, eye, flow, interpolate, isolines, light, map};
@@ -190,6 +190,16 @@ fn a_swapped_missing_or_misplaced_field_is_seen() {
     }
 }
 
+/// What the twins and the shader of clouds that look their light up share.
+const OF_LOOKS: [(&str, f32); 6] = [
+    ("LOOK", LOOK),
+    ("ASIDE", ASIDE),
+    ("LEAST_SINE", LEAST_SINE),
+    ("LEAST_COSINE_SQ", LEAST_COSINE_SQ),
+    ("MOST_POWER", MOST_POWER),
+    ("MOST_EXPONENT", MOST_EXPONENT),
+];
+
 #[test]
 fn constants_have_the_same_value_in_rust_and_wgsl() {
     let constant = |source: &str, name: &str| {
@@ -221,6 +231,7 @@ fn constants_have_the_same_value_in_rust_and_wgsl() {
         ("MOST_HOT_PARTS", f64::from(MOST_HOT_PARTS)),
         ("NO_LIST", f64::from(NO_LIST)),
         ("COVERED", f64::from(COVERED)),
+        ("SLOPE_ONE", f64::from(SLOPE_ONE)),
         ("MISSING", f64::from(MISSING)),
         ("WATER_RED", f64::from(WATER_RED)),
         ("WATER_GREEN", f64::from(WATER_GREEN)),
@@ -248,8 +259,10 @@ fn constants_have_the_same_value_in_rust_and_wgsl() {
         assert!(SOURCES.iter().any(asks), "no shader asks for {name}");
     }
     assert!((wgsl("ASKED") - f64::from(Features::ASKED.bits())).abs() < 0.5);
-    let look = constant(scatter::SOURCE, "LOOK");
-    assert!((look - f64::from(LOOK)).abs() < 1e-7);
+    for (name, value) in OF_LOOKS {
+        let own = constant(scatter::SOURCE, name);
+        assert!((own - f64::from(value)).abs() < 1e-7, "{name}");
+    }
     let width = constant(fill::STENCIL_SOURCE, "WIDTH");
     let segment = constant(fill::STENCIL_SOURCE, "SEGMENT");
     assert_eq!(segment as u32, width as u32 + 2 * MOST_REACH_COLS);

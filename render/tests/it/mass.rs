@@ -144,10 +144,10 @@ fn the_light_buffer_holds_the_depth_of_every_particle_to_the_last_integer() {
     let rounding = 8.0 * 0.5 * shown as f64 / f64::from(drawn.params.lighting.depth_one);
     assert!((kept - given).abs() < rounding && (kept / given - 1.0).abs() < 1e-5);
 
-    // The layer behind the last slice holds twice everything.
+    // The layer behind the last one holds twice everything.
     let total = held(&all);
     light::cpu::prefix(&drawn.params, &mut all);
     let layer = (drawn.params.lighting.size.x * drawn.params.lighting.size.y) as usize;
-    let last = &all[drawn.params.view.slices as usize * layer..];
+    let last = &all[drawn.params.lighting.layers as usize * layer..];
     assert_eq!(held(&last[..layer]), 2 * total);
 }

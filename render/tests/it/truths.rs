@@ -3,15 +3,15 @@
 use std::sync::Arc;
 
 use contract::job::{Mode, RenderJob};
-use glam::{UVec2, Vec3, Vec4};
+use glam::{UVec2, Vec2, Vec3, Vec4};
 use render::plan::Plan;
 use render::pyramid::coarser;
 use render::scene::{Field, Interval, Scene};
 use render::stages::eye::cpu::Hiding;
 use render::stages::interpolate::cpu::interpolated;
 use render::stages::layout::{
-    Active, COVERED, Col, Entry, KERNEL_CLOUD, MISSING, Particle, Row, SCREEN_TILE_PX, SUBPIXELS,
-    Splat, VIEW_GLOBE, is_missing,
+    Active, COVERED, Col, Entry, KERNEL_CLOUD, MISSING, Particle, Row, SCREEN_TILE_PX, SLOPE_ONE,
+    SUBPIXELS, Splat, VIEW_GLOBE, is_missing,
 };
 use render::stages::light::params::LightParams;
 use render::stages::params::{Params, ViewParams};
@@ -212,6 +212,10 @@ fn a_uniform_slab_dims_light_as_exp_of_minus_its_depth() {
     params.view.slices = slices;
     params.lighting = LightParams {
         size: UVec2::splat(6),
+        layers: slices,
+        part: 1.0,
+        sunward_per_slice: 1.0,
+        deeper: 1.0,
         unit: 16,
         ambient: 0.0,
         direct: 1.0,
@@ -311,6 +315,50 @@ fn one_cloud_is_an_analytic_disc() {
                 colour.w
             );
             assert!((f64::from(colour.x) - expected).abs() < 5e-4 && colour.z <= colour.w);
+        }
+    }
+}
+
+#[test]
+fn a_cloud_is_as_much_brighter_away_from_the_middle_of_the_earth_as_its_slope_says() {
+    let mut params = clouds(40);
+    params.view.kind = VIEW_GLOBE;
+    // Straight down: the middle of the earth is seen in the middle of the picture.
+    params.view.eye = Vec3::new(0.0, 0.0, 2.0);
+    params.view.right = Vec3::X;
+    params.view.up = Vec3::Y;
+    params.view.forward = -Vec3::Z;
+    params.view.focal_px = 50.0;
+    params.view.center_px = Vec2::splat(20.0);
+    let cloud = |x: i32, y: i32, slope: i32| Splat {
+        x_sub: x * 16,
+        y_sub: y * 16,
+        radius_px: 10.0,
+        tau: 0.8,
+        slice: 2.5,
+        colour: 0x0080_8080,
+        slope,
+        ..Splat::default()
+    };
+    // To the right of it, and above it, half as bright again a radius farther out.
+    for (x, y, out) in [(28, 20, Vec2::X), (20, 12, Vec2::NEG_Y)] {
+        let level = seen(&mut params, &[cloud(x, y, 0)]);
+        let sloping = seen(&mut params, &[cloud(x, y, (0.5 * SLOPE_ONE) as i32)]);
+        for off in [
+            Vec2::ZERO,
+            Vec2::new(4.0, 0.0),
+            Vec2::new(-4.0, 3.0),
+            Vec2::new(0.0, -6.0),
+        ] {
+            let at = Vec2::new(x as f32, y as f32) + off;
+            let pixel = at.y as usize * 40 + at.x as usize;
+            let ratio = sloping[pixel].x / level[pixel].x;
+            let expected = 1.0 + 0.5 * (off + 0.5).dot(out) / 10.0;
+            assert!(
+                (ratio - expected).abs() < 5e-3,
+                "{off}: {ratio} against {expected}"
+            );
+            assert!((sloping[pixel].w - level[pixel].w).abs() < 1e-6);
         }
     }
 }

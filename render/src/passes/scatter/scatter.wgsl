@@ -6,6 +6,9 @@
 @group(0) @binding(3) var<storage, read_write> counts: array<atomic<u32>>;
 @group(0) @binding(4) var<storage, read_write> entries: array<Entry>;
 
+// A colour that is the same all over its splat.
+const LEVEL = 0x80000000u;
+
 // Next free place of a list; afterwards list `b` is `counts[b - 1] .. counts[b]`.
 fn next_place(list: u32) -> u32 {
     let slot = find_slot(list);
@@ -34,12 +37,11 @@ fn scatter_own(at: u32) {
     let place = vec2(bitcast<i32>(near.x), bitcast<i32>(near.y));
     let reach = reach_of(place, near.z);
     if (any(reach.low > reach.high)) { return; }
-    var colour = near.w;
+    var colour = (near.w & 0xffffffu) | LEVEL;
     if (feature(IS_LIT, lighting.mode != LIGHT_OFF)) {
         let radius_px = f32((near.z & RADIUS_BITS) << lists.entry_shift) / f32(SUBPIXELS);
-        colour = shaded(colour, vec2(bitcast<i32>(far.x), bitcast<i32>(far.y)), slice, bitcast<f32>(far.w), radius_px);
+        colour = shaded(near.w, vec2(bitcast<i32>(far.x), bitcast<i32>(far.y)), slice, bitcast<f32>(far.w), radius_px);
     }
-    colour = (colour & 0xffffffu) | (u32(slice) << 24u);
     for (var y = reach.low.y; y <= reach.high.y; y++) {
         for (var x = reach.low.x; x <= reach.high.x; x++) {
             let to = next_place(list_of(x, y, u32(slice)));

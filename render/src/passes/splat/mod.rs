@@ -54,6 +54,7 @@ pub fn unpacked(seen: [u32; 4], lit: [u32; 4], lists: &ListParams) -> Splat {
         day: f32::from_bits(lit[3]),
         colour: seen[3],
         is_beyond: u32::from(seen[2] & BEYOND_BIT != 0),
+        slope: 0,
     }
 }
 

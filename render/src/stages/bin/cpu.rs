@@ -72,7 +72,7 @@ pub fn scatter(params: &Params, splats: &[Splat], counts: &mut [u32], entries: &
     for splat in splats {
         let radius = radius_of(params, splat) as u32;
         let size = radius | (splat.is_beyond * BEYOND_BIT) | (depth_of(params, splat) << 16);
-        let colour = (splat.colour & 0x00ff_ffff) | ((splat.slice as u32) << 24);
+        let colour = (splat.colour & 0x00ff_ffff) | ((splat.slope + 128) as u32) << 24;
         for list in lists_of(params, splat) {
             let tile = list as u32 / params.view.slices;
             let corner = [tile % params.view.tiles.x, tile / params.view.tiles.x]

@@ -8,15 +8,17 @@ const STRIDE = 2u; // rows between an invocation's pixels
 const COLUMN = 8u; // pixels of an invocation
 
 // An entry as the pixels of one column see it.
-struct Near { radius_px: f32, inverse_radius: f32, south: f32, east: f32, depth: f32, rgb: vec3<u32>, is_hidden: bool }
+struct Near { radius_px: f32, inverse_radius: f32, south: f32, east: f32, depth: f32, rgb: vec3<u32>, is_hidden: bool, brightness: f32, slope: f32 }
 
 fn near_of(entry: Entry, column: f32, pixel_units: f32) -> Near {
     let radius_px = f32(i32(entry.size & RADIUS_BITS)) / pixel_units;
     let place = vec2(f32(i32(entry.place << 16u) >> 16u), f32(i32(entry.place) >> 16u)) / pixel_units;
     let inverse_radius = 1.0 / radius_px;
     let rgb = light_of(entry.colour);
-    return Near(radius_px, inverse_radius, place.y, (column - place.x) * inverse_radius, f32(i32(entry.size >> 16u)), rgb,
-        is_behind(entry));
+    let east = (column - place.x) * inverse_radius;
+    let slope = slope_of(entry, place);
+    return Near(radius_px, inverse_radius, place.y, east, f32(i32(entry.size >> 16u)), rgb, is_behind(entry),
+        1.0 + slope.x * east, slope.y);
 }
 
 // A number below 2^31 without its fraction: vectors of processors convert signed integers at once, unsigned ones in steps.
@@ -27,12 +29,14 @@ fn whole(x: f32) -> u32 {
 // What an entry gives to the pixel of a row, where so much of what lies beyond the sea surface is kept; nothing beyond its radius.
 fn given(near: Near, row: f32, kept: f32) -> vec4<u32> {
     let south = (row - near.south) * near.inverse_radius;
-    let amount = whole(near.depth * weight_at(near.east * near.east + south * south, near.radius_px)
-        * select(1.0, kept, near.is_hidden) + 0.5);
+    let share = near.depth * weight_at(near.east * near.east + south * south, near.radius_px) * select(1.0, kept, near.is_hidden);
+    let amount = whole(share + 0.5);
+    var bright = amount;
+    if (KERNEL == KERNEL_CLOUD && !is_tile()) { bright = whole(min(share * (near.brightness + near.slope * south), MOST_BRIGHT) + 0.5); }
     var rgb = near.rgb;
     if (KERNEL == KERNEL_BALL) { rgb = vec3<u32>(vec3<f32>(rgb) * ball_light(vec2(near.east, south)) + 0.5); }
     if (KERNEL == KERNEL_RIMMED) { rgb = rimmed(rgb, near.east * near.east + south * south, near.radius_px); }
-    return vec4(sixteenth(rgb * amount), amount);
+    return vec4(sixteenth(rgb * bright), amount);
 }
 
 fn more(sums: vec4<u32>, given: vec4<u32>) -> vec4<u32> {
@@ -55,6 +59,7 @@ fn alone(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation_
     let center = vec2<f32>(local.xy) + 0.5;
     let pixel_units = f32(SUBPIXELS) / f32(1u << lists.entry_shift);
     let pixel = workgroup.xy * SCREEN_TILE_PX + local.xy;
+    set_corner(workgroup.xy);
     var colours: array<vec4<f32>, COLUMN>;
     var kept: array<f32, COLUMN>;
     for (var i = 0u; i < COLUMN; i++) {

@@ -6,7 +6,7 @@ use crate::plan::Plan;
 use crate::stages::compose::in_context::hidden_share;
 use crate::stages::layout::{
     BEYOND_BIT, Entry, KERNEL_BALL, KERNEL_CLOUD, KERNEL_RIMMED, RADIUS_BITS, SCREEN_TILE_PX,
-    SUBPIXELS,
+    SLOPE_ONE, SUBPIXELS, VIEW_TILE,
 };
 use crate::stages::params::Params;
 
@@ -15,6 +15,8 @@ const MOST_SUM: u32 = 0x7fff_ffff;
 const OPAQUE: f32 = 1.0 - 1.0 / 4096.0;
 /// Light 1 of a channel in the whole numbers that [`light_of`] gives: 255 squared over 16.
 const LIGHT_ONE: f32 = 4064.0625;
+/// Depth times light, as a share of what is added with it: an entry gives less than 2^24 to a sum.
+const MOST_BRIGHT: f32 = 65_535.0;
 const TILE: usize = SCREEN_TILE_PX as usize;
 
 /// Sums of red, green, blue and optical depth of every pixel of a screen tile.
@@ -125,10 +127,17 @@ pub fn eye(
             } else {
                 list_ends[first_list - 1] as usize
             };
-            let end = list_ends[first_list + params.view.slices as usize - 1] as usize;
+            let ends = &list_ends[first_list..first_list + params.view.slices as usize];
             let [left, top] = [tile_x, tile_y].map(|tile| tile * SCREEN_TILE_PX);
-            let kept = kept_beyond(params, hiding, [left, top]);
-            let colours = screen_tile(params, &entries[first..end], &kept);
+            let tile = ScreenTile {
+                corner: UVec2::new(left, top),
+                kept: kept_beyond(params, hiding, [left, top]),
+            };
+            let slices = ends.iter().scan(first, |start, &end| {
+                let begin = std::mem::replace(start, end as usize);
+                Some(&entries[begin..end as usize])
+            });
+            let colours = tile.seen(params, slices);
             for y in top..(top + SCREEN_TILE_PX).min(params.view.size_px.y) {
                 for x in left..(left + SCREEN_TILE_PX).min(params.view.size_px.x) {
                     picture[(y * params.view.size_px.x + x) as usize] =
@@ -139,21 +148,46 @@ pub fn eye(
     }
 }
 
-fn screen_tile(params: &Params, list: &[Entry], kept: &Kept) -> [Vec4; TILE * TILE] {
-    let mut colours = [Vec4::ZERO; TILE * TILE];
-    for slice in list.chunk_by(|a, b| a.colour >> 24 == b.colour >> 24) {
-        let mut sums = [[0u32; 4]; TILE * TILE];
-        for entry in slice {
-            add(params, entry, kept, &mut sums);
-        }
-        for (colour, sums) in colours.iter_mut().zip(sums) {
-            *colour = blended(params, *colour, sums);
-        }
-    }
-    colours
+/// Where a screen tile lies, and what it keeps.
+struct ScreenTile {
+    corner: UVec2,
+    kept: Kept,
 }
 
-fn add(params: &Params, entry: &Entry, kept: &Kept, sums: &mut Sums) {
+impl ScreenTile {
+    fn seen<'a>(
+        &self,
+        params: &Params,
+        slices: impl Iterator<Item = &'a [Entry]>,
+    ) -> [Vec4; TILE * TILE] {
+        let mut colours = [Vec4::ZERO; TILE * TILE];
+        for slice in slices.filter(|slice| !slice.is_empty()) {
+            let mut sums = [[0u32; 4]; TILE * TILE];
+            for entry in slice {
+                add(params, entry, self, &mut sums);
+            }
+            for (colour, sums) in colours.iter_mut().zip(sums) {
+                *colour = blended(params, *colour, sums);
+            }
+        }
+        colours
+    }
+
+    /// How a cloud's light rises across it, for each radius: away from the middle of the earth as it is seen.
+    fn slope(&self, params: &Params, entry: &Entry, place: Vec2) -> Vec2 {
+        let view = &params.view;
+        if params.lists.kernel != KERNEL_CLOUD || view.kind == VIEW_TILE {
+            return Vec2::ZERO;
+        }
+        let middle = Vec2::new(-view.eye.dot(view.right), view.eye.dot(view.up)) * view.focal_px;
+        let corner = (self.corner.as_ivec2() + view.origin_px).as_vec2();
+        let up = middle + (corner + place - view.center_px) * view.eye.dot(view.forward);
+        let slope = ((entry.colour >> 24) as i32 - 128) as f32 / SLOPE_ONE;
+        -up / up.dot(up).max(1.0e-12).sqrt() * slope
+    }
+}
+
+fn add(params: &Params, entry: &Entry, tile: &ScreenTile, sums: &mut Sums) {
     let pixel_units = SUBPIXELS as f32 / (1u32 << params.lists.entry_shift) as f32;
     let radius = (entry.size & RADIUS_BITS) as f32;
     let inverse_radius = 1.0 / radius;
@@ -168,14 +202,21 @@ fn add(params: &Params, entry: &Entry, kept: &Kept, sums: &mut Sums) {
         let end = ((place + radius) / pixel_units + 1.5).clamp(0.0, TILE as f32) as usize;
         low.min(end)..end
     };
+    let slope = tile.slope(params, entry, Vec2::new(east, south) / pixel_units);
     for y in reach(south) {
         for x in reach(east) {
             let center = Vec2::new(x as f32 + 0.5, y as f32 + 0.5) * pixel_units;
             let offset = (center - Vec2::new(east, south)) * inverse_radius;
             let q = offset.dot(offset);
             let weight = weight_at(params.lists.kernel, q, radius / pixel_units);
-            let kept = if is_beyond { kept[y * TILE + x] } else { 1.0 };
-            let amount = (depth * weight * kept + 0.5) as u32;
+            let kept = if is_beyond {
+                tile.kept[y * TILE + x]
+            } else {
+                1.0
+            };
+            let share = depth * weight * kept;
+            let amount = (share + 0.5) as u32;
+            let bright = ((share * (1.0 + slope.dot(offset))).min(MOST_BRIGHT) + 0.5) as u32;
             let sum = &mut sums[y * TILE + x];
             let own = if params.lists.kernel == KERNEL_RIMMED {
                 rimmed(params, rgb, q, radius / pixel_units)
@@ -188,7 +229,7 @@ fn add(params: &Params, entry: &Entry, kept: &Kept, sums: &mut Sums) {
                 } else {
                     plain
                 };
-                sum[channel] = (sum[channel] + ((lit * amount + 8) >> 4)).min(MOST_SUM);
+                sum[channel] = (sum[channel] + ((lit * bright + 8) >> 4)).min(MOST_SUM);
             }
             sum[3] = (sum[3] + amount).min(MOST_SUM);
         }

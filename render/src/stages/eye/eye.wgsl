@@ -98,6 +98,24 @@ fn rimmed(rgb: vec3<u32>, q: f32, radius_px: f32) -> vec3<u32> {
 }
 const RIM_PX = 0.7;
 
+// Upper left corner of the screen tile, pixels of the whole picture.
+var<private> corner_px: vec2<f32>;
+
+fn set_corner(tile: vec2<u32>) {
+    corner_px = vec2<f32>(vec2<i32>(tile * SCREEN_TILE_PX) + view.origin_px);
+}
+
+// How a cloud's light rises across it, for each radius: away from the middle of the earth as it is seen. `place` in the tile.
+fn slope_of(entry: Entry, place: vec2<f32>) -> vec2<f32> {
+    if (KERNEL != KERNEL_CLOUD || is_tile()) { return vec2(0.0); }
+    let middle = vec2(-dot(view.eye, view.right), dot(view.eye, view.up)) * view.focal_px;
+    let up = middle + (corner_px + place - view.center_px) * dot(view.eye, view.forward);
+    return -up * inverseSqrt(max(dot(up, up), 1.0e-12)) * (f32(i32(entry.colour >> 24u) - 128) / SLOPE_ONE);
+}
+
+// Depth times light, as a share of what is added with it: an entry gives less than 2^24 to a sum.
+const MOST_BRIGHT = 65535.0;
+
 // Adds an entry to every second row of pixels.
 fn add(entry: Entry, half: i32) {
     let pixel_units = f32(SUBPIXELS) / f32(1u << lists.entry_shift);
@@ -110,6 +128,7 @@ fn add(entry: Entry, half: i32) {
     let high = min(vec2<i32>(floor(place + radius_px - 0.5)), vec2(i32(SCREEN_TILE_PX) - 1));
     let inverse_radius = 1.0 / radius_px;
     let is_hidden = is_behind(entry);
+    let slope = slope_of(entry, place);
     for (var y = low.y + ((low.y ^ half) & 1); y <= high.y; y += 2) {
         let south = (f32(y) + 0.5 - place.y) * inverse_radius;
         for (var x = low.x; x <= high.x; x++) {
@@ -117,12 +136,14 @@ fn add(entry: Entry, half: i32) {
             let pixel = u32(y) * SCREEN_TILE_PX + u32(x);
             var kept = 1.0;
             if (is_hidden) { kept = kept_of((hidden[pixel >> 2u] >> ((pixel & 3u) * 8u)) & 255u); }
-            let amount = u32(depth * weight_at(east * east + south * south, radius_px) * kept + 0.5);
+            let share = depth * weight_at(east * east + south * south, radius_px) * kept;
+            let amount = u32(share + 0.5);
             if (amount == 0u) { continue; }
+            let bright = u32(min(share * (1.0 + slope.x * east + slope.y * south), MOST_BRIGHT) + 0.5);
             var own = rgb;
             if (KERNEL == KERNEL_BALL) { own = vec3<u32>(vec3<f32>(rgb) * ball_light(vec2(east, south)) + 0.5); }
             if (KERNEL == KERNEL_RIMMED) { own = rimmed(rgb, east * east + south * south, radius_px); }
-            let given = sixteenth(own * amount);
+            let given = sixteenth(own * bright);
             atomicAdd(&sums[pixel], given.x);
             atomicAdd(&sums[PIXELS + pixel], given.y);
             atomicAdd(&sums[2u * PIXELS + pixel], given.z);
@@ -175,6 +196,7 @@ fn eye(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(global_invocation_i
     @builtin(local_invocation_index) invocation: u32) {
     for (var channel = 0u; channel < 4u; channel++) { atomicStore(&sums[channel * PIXELS + invocation], 0u); }
     look_up_hidden(workgroup.xy, invocation);
+    set_corner(workgroup.xy);
     let first_list = (workgroup.y * view.tiles.x + workgroup.x) * view.slices;
     var colour = vec4(0.0);
     for (var first = 0u; first < view.slices; first += LOOKED_UP) {

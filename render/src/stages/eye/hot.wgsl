@@ -42,6 +42,7 @@ fn hot(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) wor
         if (list == NO_LIST) { continue; }
         let tile = list / view.slices;
         look_up_hidden(vec2(tile % view.tiles.x, tile / view.tiles.x), invocation);
+        set_corner(vec2(tile % view.tiles.x, tile / view.tiles.x));
         workgroupBarrier();
         var begin = 0u;
         if (list > 0u) { begin = min(list_ends[list - 1u], lists.entry_capacity); }

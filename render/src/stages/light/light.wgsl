@@ -1,4 +1,4 @@
-// A sum along the slices turns the depth given to each slice into twice the depth above its middle: that above its upper
+// A sum along the layers turns the depth given to each layer into twice the depth above its middle: that above its upper
 // plane and that above its lower one; the layer behind the last holds twice the whole. A column of texels is cut into segments, one invocation each, whose sums are added up in shared memory.
 @group(0) @binding(1) var<storage, read_write> light: array<u32>;
 
@@ -19,10 +19,10 @@ fn prefix(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) 
     @builtin(local_invocation_id) local: vec3<u32>) {
     let layer = lighting.size.x * lighting.size.y;
     let column = (workgroup.y * workgroups.x + workgroup.x) * COLUMNS + local.x;
-    // One layer more than slices: it receives the whole.
-    let length = (view.slices + SEGMENTS) / SEGMENTS;
-    let begin = min(local.y * length, view.slices + 1u);
-    let end = select(begin, min(begin + length, view.slices + 1u), column < layer);
+    // One layer more: it receives the whole.
+    let length = (lighting.layers + SEGMENTS) / SEGMENTS;
+    let begin = min(local.y * length, lighting.layers + 1u);
+    let end = select(begin, min(begin + length, lighting.layers + 1u), column < layer);
     var sum = 0u;
     for (var base = begin; base < end; base += STEP) {
         var own: array<u32, 8>;
@@ -57,8 +57,8 @@ fn straight(@builtin(global_invocation_id) global: vec3<u32>, @builtin(num_workg
     let column = list_index(global, workgroups);
     if (column >= layer) { return; }
     var above = 0u;
-    for (var slice = 0u; slice <= view.slices; slice++) {
-        let at = slice * layer + column;
+    for (var i = 0u; i <= lighting.layers; i++) {
+        let at = i * layer + column;
         let below = deeper(above, min(light[at], DARK));
         light[at] = above + below;
         above = below;

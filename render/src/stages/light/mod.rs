@@ -1,5 +1,6 @@
-//! The light's side of half-angle slicing: splats give their optical depth to a slice-layered buffer, a sum along the
-//! slices turns it into twice the depth above each slice's middle, and every splat is dimmed by what lies between it and the sun.
+//! The light's side of half-angle slicing: splats give their optical depth to a layered buffer, a sum along the layers turns
+//! it into twice the depth above each layer's middle, and every splat is dimmed by what lies between it and the sun. Layers lie
+//! across the light on globes; those of map tiles are the eye's slices, which are the same for all tiles of a level.
 //!
 //! Depth is given in the pass that makes the splats and read in the pass that scatters them; here is the sum.
 
@@ -10,7 +11,7 @@ use crate::error::RenderError;
 use crate::frame_context::FrameContext;
 use crate::gpu::{Gpu, Kernel};
 use crate::stages::layout::GROUP;
-use crate::stages::params::Uniform::{Lighting, View};
+use crate::stages::params::Uniform::Lighting;
 
 /// The entry point that cuts columns of texels into segments; for GPUs.
 pub const SEGMENTED: &str = "prefix";
@@ -53,14 +54,12 @@ impl Light {
     /// Compiles an entry point of `source`, [`SOURCE`] but for tests.
     pub fn of(gpu: &Gpu, source: &str, entry: &str) -> Self {
         Self {
-            prefix: gpu
-                .kernel("light", source, entry)
-                .reading(&[View, Lighting]),
+            prefix: gpu.kernel("light", source, entry).reading(&[Lighting]),
             columns: if entry == STRAIGHT { GROUP } else { 32 },
         }
     }
 
-    /// Turns the depth of each slice into twice the depth above its middle.
+    /// Turns the depth of each layer into twice the depth above its middle.
     pub fn record(&self, frame: &mut FrameContext<'_>) -> Result<(), RenderError> {
         let light = frame.light()?;
         let columns = frame.params.lighting.size.element_product();

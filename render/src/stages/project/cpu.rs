@@ -102,6 +102,7 @@ fn on_tile(params: &Params, row: &Row, col: &Col, particle: &Particle) -> Splat 
         },
         colour: particle.colour | UNDIMMED,
         is_beyond: u32::from(-particle.height_m > projection.beyond_m),
+        slope: 0,
     }
 }
 

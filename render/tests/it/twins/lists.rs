@@ -5,7 +5,7 @@ use render::passes::scatter::{self, Scatter};
 use render::passes::splat::{self, Splats};
 use render::passes::{NO_PROBES, SHARED_PROBES};
 use render::stages::bin::{self, Bin};
-use render::stages::layout::Entry;
+use render::stages::layout::{Entry, VIEW_GLOBE};
 use render::stages::light::{self, Light};
 use render::stages::sizes::list_count;
 
@@ -28,11 +28,11 @@ fn sorted_lists(list_ends: &[u32], entries: &[Entry]) -> Vec<Vec<[u32; 3]>> {
     lists.collect()
 }
 
-/// Do two sets of lists hold the same entries, their colours but for the last bit?
+/// Do two sets of lists hold the same entries, their colours and slopes but for the last bit?
 fn same_lists(a: &[Vec<[u32; 3]>], b: &[Vec<[u32; 3]>]) -> bool {
     let same_colour = |a: u32, b: u32| {
         let channels = a.to_le_bytes().into_iter().zip(b.to_le_bytes());
-        channels.into_iter().all(|(a, b)| a.abs_diff(b) <= 1) && a >> 24 == b >> 24
+        channels.into_iter().all(|(a, b)| a.abs_diff(b) <= 1)
     };
     let same = |a: &[u32; 3], b: &[u32; 3]| a[..2] == b[..2] && same_colour(a[2], b[2]);
     a.len() == b.len()
@@ -99,12 +99,14 @@ fn the_lists_hold_every_stored_splat_once_and_in_its_light() {
             "counts[at] += start + 1u",
             |gpu, source| distance(gpu, source, (scatter::SOURCE, SHARED_PROBES)),
         );
+        if twins.params.view.kind == VIEW_GLOBE {
+            let (right, wrong) = ("(above - below)", "(below - above)");
+            prove("slope", scatter::SOURCE, right, wrong, |gpu, source| {
+                distance(gpu, bin::SOURCE, (source, SHARED_PROBES))
+            });
+        }
         for (probes, right, wrong) in [
-            (
-                SHARED_PROBES,
-                "vec2(exp(-depth), 1.0)",
-                "vec2(exp(depth), 1.0)",
-            ),
+            (SHARED_PROBES, "exp(-near)", "exp(near)"),
             (
                 SHARED_PROBES,
                 "atomicAdd(&counts[tag - 1u], atomicLoad",

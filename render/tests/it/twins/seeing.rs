@@ -7,6 +7,7 @@ use render::stages::compose;
 use render::stages::compose::in_context::Surroundings;
 use render::stages::eye::cpu::Hiding;
 use render::stages::eye::{self, Eye};
+use render_proof::views::looking_at;
 
 use super::{Twins, bytes, channels, far_apart, prove};
 use crate::compare::worst;
@@ -49,14 +50,41 @@ fn eye_matches_its_twin_in_every_kernel() {
 }
 
 #[test]
+fn light_that_rises_across_a_cloud_is_seen_as_the_twin_sees_it() {
+    let twins = Twins::of(
+        Mode::Volume,
+        looking_at([-122.0, 27.0], 2.2e6, [30.0, 60.0], 96),
+    );
+    let steep = twins
+        .entries
+        .iter()
+        .filter(|entry| (entry.colour >> 24).abs_diff(128) > 16);
+    assert!(steep.count() > twins.entries.len() / 20);
+    let expected = bytes(twins.image.iter().copied());
+    for entry in [eye::SHARED, eye::ALONE] {
+        for (right, wrong) in [
+            ("1.0 + slope.x * east", "1.0 - slope.x * east"),
+            (
+                "(corner_px + place - view.center_px)",
+                "(place - view.center_px)",
+            ),
+        ] {
+            prove("eye", eye::SOURCE, right, wrong, |gpu, source| {
+                far_apart(&eye_image(&twins, gpu, source, entry), &expected, 1.01)
+            });
+        }
+    }
+}
+
+#[test]
 fn pixels_that_work_alone_and_pixels_that_share_come_to_the_same_picture() {
     for mode in [Mode::Volume, Mode::Sprites, Mode::Points] {
         let twins = Twins::of(mode, tile(1, 0, 0, 256));
         prove(
             "eye",
             eye::SOURCE,
-            "sixteenth(rgb * amount), amount)",
-            "sixteenth(rgb * amount), amount + 1u)",
+            "sixteenth(rgb * bright), amount)",
+            "sixteenth(rgb * bright), amount + 1u)",
             |gpu, source| {
                 let [shared, alone] =
                     [eye::SHARED, eye::ALONE].map(|entry| eye_image(&twins, gpu, source, entry));
