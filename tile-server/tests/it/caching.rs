@@ -254,6 +254,43 @@ async fn whoever_draws_a_picture_is_the_one_who_stores_it() {
 }
 
 #[tokio::test]
+async fn a_view_of_a_free_camera_is_remembered_and_not_stored() {
+    let app = TestApp::new().await;
+    let view = "/globe/flux/volume.png?lon=12.5&lat=-3&height_km=5000&time=2000-02-01";
+    let first = app.get(view).await;
+    assert_eq!(first.status, StatusCode::OK, "{}", first.text());
+    assert_eq!(app.get(view).await.body, first.body);
+    assert_eq!(app.drawer.drawn_count(), 1, "the second time from memory");
+    assert_eq!(*app.drawer.keeps.lock().unwrap(), [Keep::No]);
+    for lon in 0..20 {
+        app.get(&format!("/globe/flux/volume.png?lon={lon}")).await;
+    }
+    assert_eq!(app.drawer.drawn_count(), 21);
+    let stored = app.store.list("tiles").await.unwrap();
+    assert!(stored.is_empty(), "strangers fill the store: {stored:?}");
+    let not_stored = r#"fluxglobe_tile_server_not_stored_total{why="view"}"#;
+    assert_eq!(app.metric(not_stored).await, 21);
+}
+
+#[tokio::test]
+async fn tiles_beyond_what_may_be_stored_in_a_day_are_given_out_and_remembered() {
+    let app = TestApp::with(|settings| settings.stored_bytes_per_day = 1).await;
+    let tile = |x: u32| format!("/tiles/flux/map/4/{x}/0.png");
+    for _ in 0..2 {
+        for x in 0..8 {
+            assert_eq!(app.get(&tile(x)).await.status, StatusCode::OK);
+        }
+    }
+    assert_eq!(app.drawer.drawn_count(), 8);
+    // Whoever comes first does not know how large its picture will be.
+    let keeps = app.drawer.keeps.lock().unwrap().clone();
+    assert_eq!(keeps, [&[Keep::Yes][..], &[Keep::No; 7]].concat());
+    assert_eq!(app.store.list("tiles").await.unwrap().len(), 1);
+    let not_stored = r#"fluxglobe_tile_server_not_stored_total{why="allowance"}"#;
+    assert_eq!(app.metric(not_stored).await, 7);
+}
+
+#[tokio::test]
 async fn a_damaged_picture_is_drawn_to_be_stored_anew() {
     let app = TestApp::with(|settings| settings.tile_memory_bytes = 0).await;
     let first = app.get(TILE).await;
