@@ -21,6 +21,7 @@
 //!
 //! Left out on purpose: drawing and computing, which come in through the traits of [`backend`].
 
+mod addresses;
 mod allowance;
 mod analyses;
 mod annotations;

@@ -129,9 +129,8 @@ impl Pictures {
         let maker = &self.maker;
         let digest = job.digest();
         if encoding.is_stored()
-            && let Some(picture) = maker.memory.get(&digest)
+            && let Some(picture) = self.remembered(&digest)
         {
-            maker.metrics.hit(Source::Memory);
             return Ok(picture);
         }
         let refused = |_busy: &ServerError| maker.metrics.refused.inc();
@@ -144,10 +143,21 @@ impl Pictures {
         Ok(picture)
     }
 
+    /// Counts a picture that needs no drawing.
+    pub(crate) fn hit(&self, source: Source) {
+        self.maker.metrics.hit(source);
+    }
+
+    /// The picture of a job, if it lies in memory.
+    pub(crate) fn remembered(&self, digest: &Digest) -> Option<Bytes> {
+        let picture = self.maker.memory.get(digest)?;
+        self.hit(Source::Memory);
+        Some(picture)
+    }
+
     /// The picture of a job, as a PNG. Its digest is the caller's to tell: of a picture that is there it is most of the work.
     pub async fn get(&self, digest: Digest, job: RenderJob) -> Result<Bytes, ServerError> {
-        if let Some(picture) = self.maker.memory.get(&digest) {
-            self.maker.metrics.hit(Source::Memory);
+        if let Some(picture) = self.remembered(&digest) {
             return Ok(picture);
         }
         let maker = Arc::clone(&self.maker);

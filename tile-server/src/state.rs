@@ -7,6 +7,7 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use storage::Store;
 use storage::log::EventLog;
 
+use crate::addresses::Addresses;
 use crate::analyses::Analyses;
 use crate::backend::{Analyse, Draw, Observe};
 use crate::catalogue::Catalogue;
@@ -32,6 +33,8 @@ pub struct Parts {
     pub(crate) cubes: Cubes,
     /// Drawn pictures.
     pub pictures: Pictures,
+    /// Tiles that were asked for.
+    pub(crate) addresses: Addresses,
     /// Series and budgets.
     pub analyses: Analyses,
     /// Asked directly only whether it is ready.
@@ -87,6 +90,7 @@ impl AppState {
             catalogue: Catalogue::new(store.clone(), max_age, metrics.clone()),
             cubes: Cubes::new(store.clone()),
             pictures: Pictures::new(store, Arc::clone(&drawer), draws, &limits, metrics.clone()),
+            addresses: Addresses::default(),
             analyses: Analyses::new(analyst, analyses, metrics.clone()),
             drawer,
             observer: OnceLock::new(),

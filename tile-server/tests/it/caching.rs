@@ -203,6 +203,45 @@ async fn a_new_version_is_another_picture_and_the_old_one_stays() {
 }
 
 #[tokio::test]
+async fn an_address_that_is_asked_for_again_is_answered_the_same_and_counts_the_same() {
+    let app = TestApp::new().await;
+    let pinned = pinned_tile(&app, "/tiles/flux/volume.json").await;
+    let looks = "/tiles/flux/volume/1/0/0.png?time=2000-02-01&palette=haline";
+    let beyond = "/tiles/flux/volume/1/0/0@2x.png?time=2150";
+    for address in [TILE, &pinned, looks, beyond] {
+        let [first, second, third] = [(); 3].map(|()| app.get(address));
+        let (first, second, third) = (first.await, second.await, third.await);
+        assert_eq!(first.status, StatusCode::OK, "{address}: {}", first.text());
+        assert_eq!(first.headers, second.headers, "{address}");
+        assert_eq!(
+            (&first.body, &second.headers),
+            (&second.body, &third.headers)
+        );
+        let tag = first.header("etag").to_owned();
+        let known = app.get_with(address, &[("if-none-match", &tag)]).await;
+        assert_eq!(known.status, StatusCode::NOT_MODIFIED, "{address}");
+        for name in [
+            "etag",
+            "cache-control",
+            "fluxglobe-time",
+            "fluxglobe-heights-end",
+        ] {
+            assert_eq!(known.header(name), first.header(name), "{address}");
+        }
+    }
+    // What was asked for in its usual look, at one place and instant by two addresses, and at another one.
+    let hot = app.state.hot.of(&"flux".parse().unwrap(), 9, |_time| true);
+    let asked: Vec<_> = hot.iter().map(|tile| tile.asked).collect();
+    assert_eq!(asked, [8, 4]);
+    let hits = r#"fluxglobe_tile_server_cache_hits_total{source="memory"}"#;
+    assert_eq!(app.metric(hits).await, 3 + 2 + 2 + 2);
+    let nothing = app
+        .get("/tiles/flux/volume/1/0/9.png?time=2000-02-01")
+        .await;
+    assert_eq!(nothing.status, StatusCode::BAD_REQUEST);
+}
+
+#[tokio::test]
 async fn the_list_of_products_is_read_no_more_often_than_told() {
     let app = TestApp::with(|settings| settings.catalogue_age_ms = 3_600_000).await;
     let before = app.get(TILE).await;
