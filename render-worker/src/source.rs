@@ -223,16 +223,19 @@ impl Source {
         let grid = relief.grid;
         // No domain: its gaps are not filled.
         let key = (relief.field.clone(), relief.field.clone(), None);
-        if let Some(held) = self.fields.get(&key) {
-            let elevation = held.field;
-            self.field_hits.fetch_add(1, Ordering::Relaxed);
-            // Found under its content, which says nothing of the grid of another job.
-            let fits = elevation.cells.content().len() == grid.cell_count();
-            let mismatch = || mismatch(&relief.field);
-            return fits
-                .then_some(Terrain { grid, elevation })
-                .ok_or_else(mismatch);
-        }
+        let place = match self.fields.get_value_or_guard_async(&key).await {
+            Ok(held) => {
+                let elevation = held.field;
+                self.field_hits.fetch_add(1, Ordering::Relaxed);
+                // Found under its content, which says nothing of the grid of another job.
+                let fits = elevation.cells.content().len() == grid.cell_count();
+                let mismatch = || mismatch(&relief.field);
+                return fits
+                    .then_some(Terrain { grid, elevation })
+                    .ok_or_else(mismatch);
+            }
+            Err(place) => place,
+        };
         self.field_misses.fetch_add(1, Ordering::Relaxed);
         let read = storage::fields::read(&self.store, &relief.field, &grid).await;
         let values = read.map_err(|source| DrawError::Store {
@@ -241,11 +244,9 @@ impl Source {
             source: Box::new(source),
         })?;
         let held = Held::new(Field::new(values), Wanted::Now);
-        self.fields.insert(key, held.clone());
-        Ok(Terrain {
-            grid,
-            elevation: held.field,
-        })
+        let elevation = Arc::clone(&held.field);
+        drop(place.insert(held));
+        Ok(Terrain { grid, elevation })
     }
 
     /// The domain of a sample and the fields around it.

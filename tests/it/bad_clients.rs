@@ -29,6 +29,8 @@ const OPENERS: usize = 20;
 const STREAMS: usize = 512;
 /// Open files that a server is started with: fewer than its connections need, as on many machines.
 const FEW_FILES: u64 = 1024;
+/// Within which a connection is answered that is let in at once: less than until an idle one makes room.
+const PROMPT: Duration = Duration::from_secs(10);
 const MONTHS: usize = 6;
 
 /// A data folder with a flux, and another one that will be removed.
@@ -221,6 +223,24 @@ fn crowd(url: &str) {
     assert_eq!(granted + told, CROWD);
 }
 
+/// Twice as many connections as the server had open files at its start: all are answered while all of them stay.
+fn more_than_files(url: &str) {
+    let mut open: Vec<TcpStream> = vec![];
+    for number in 0..2 * FEW_FILES {
+        let mut socket = raw_stream::connect(url).unwrap();
+        socket
+            .write_all(b"GET /healthz HTTP/1.1\r\nHost: a\r\n\r\n")
+            .unwrap();
+        socket.set_read_timeout(Some(PROMPT)).unwrap();
+        let mut status = [0; 12];
+        if let Err(error) = socket.read_exact(&mut status) {
+            panic!("no answer beside {number} connections: {error}");
+        }
+        assert_eq!(&status, b"HTTP/1.1 200", "beside {number}");
+        open.push(socket);
+    }
+}
+
 /// A product whose objects are removed while it is looked at.
 fn removed(server: &Server, data: &Path) {
     let mut camera = Camera::connect(&server.url).unwrap();
@@ -357,6 +377,9 @@ fn whatever_clients_do_they_are_told_so_and_others_have_their_pictures() {
         serve("large pictures", &mut || hundred_million_pixels(&server));
         serve("a removed product", &mut || removed(&server, data.path()));
         serve("thousands of streams", &mut || crowd(&server.url));
+        serve("more connections than files", &mut || {
+            more_than_files(&server.url);
+        });
         for silent in silent {
             let (code, reason) = silent.join().unwrap();
             assert_eq!((code, &*reason), (1008, "no answer within 30 s"));

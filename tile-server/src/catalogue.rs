@@ -118,6 +118,13 @@ impl Catalogue {
         Ok(drifting(older, newest.northward.as_ref()))
     }
 
+    /// Is a layer still what the name of its product means?
+    pub(crate) async fn is_still(&self, layer: &Arc<Layer>) -> Result<bool, ServerError> {
+        let snapshot = self.snapshot().await?;
+        let newest = snapshot.layers.get(&layer.manifest.product);
+        Ok(newest.is_some_and(|newest| Arc::ptr_eq(newest, layer)))
+    }
+
     /// Is there no newer version known?
     pub(crate) fn is_newest(&self, layer: &Layer) -> bool {
         let newest = self.state().snapshot.clone();

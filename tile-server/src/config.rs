@@ -6,6 +6,8 @@ use std::path::PathBuf;
 
 const LISTEN: SocketAddr = SocketAddr::new(IpAddr::V4(Ipv4Addr::LOCALHOST), 8080);
 const TILE_MEMORY_BYTES: u64 = 256 << 20;
+/// Some 200,000 tiles.
+const STORED_BYTES_PER_DAY: u64 = 4 << 30;
 const MOST_DRAWS_AT_ONCE: u32 = 1024;
 const DRAW_QUEUE: u32 = 256;
 const ANALYSES_AT_ONCE: u32 = 2;
@@ -30,6 +32,10 @@ pub struct Settings {
     /// Memory for drawn pictures, bytes, 0 to 64 GiB
     #[arg(long, env = "FLUXGLOBE_TILE_MEMORY_BYTES", default_value_t = TILE_MEMORY_BYTES, value_parser = clap::value_parser!(u64).range(0..=64 << 30))]
     pub tile_memory_bytes: u64,
+    /// Tiles that whoever asks for them has stored, bytes a day, 0 to 1 TiB; more are drawn and given out, and stay in memory
+    /// alone. Views of the globe are never stored, and tiles that are drawn ahead always
+    #[arg(long, env = "FLUXGLOBE_STORED_BYTES_PER_DAY", default_value_t = STORED_BYTES_PER_DAY, value_parser = clap::value_parser!(u64).range(0..=1 << 40))]
+    pub stored_bytes_per_day: u64,
     /// Pictures drawn at the same time, 1 to 1024; if absent 8 on a graphics card, 2 on a software adapter, as many as
     /// there are cores with --cpu, and 32 where render workers draw. Pictures that are encoded do not count
     #[arg(long, env = "FLUXGLOBE_DRAWS_AT_ONCE", value_parser = draws_at_once)]
@@ -72,6 +78,7 @@ impl Default for Settings {
             listen: LISTEN,
             viewer: None,
             tile_memory_bytes: TILE_MEMORY_BYTES,
+            stored_bytes_per_day: STORED_BYTES_PER_DAY,
             draws_at_once: None,
             draw_queue: DRAW_QUEUE,
             analyses_at_once: ANALYSES_AT_ONCE,

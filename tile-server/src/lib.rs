@@ -21,6 +21,8 @@
 //!
 //! Left out on purpose: drawing and computing, which come in through the traits of [`backend`].
 
+mod addresses;
+mod allowance;
 mod analyses;
 mod annotations;
 pub mod backend;

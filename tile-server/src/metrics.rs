@@ -71,6 +71,8 @@ pub struct Metrics {
     pub send_duration_s: HistogramVec,
     /// Requests sent away because too many waited.
     pub refused: IntCounter,
+    /// Pictures that were drawn and not stored, by why not.
+    pub not_stored: IntCounterVec,
     /// Failed reads of the store.
     pub store_failures: IntCounter,
     /// Panics that were caught.
@@ -158,6 +160,11 @@ impl Metrics {
             refused: counter(
                 "refused_total",
                 "Requests sent away because too many waited.",
+            )?,
+            not_stored: counters(
+                "not_stored_total",
+                "Pictures drawn and not stored.",
+                &["why"],
             )?,
             store_failures: counter("store_failures_total", "Failed reads of the store.")?,
             panics: counter("panics_total", "Panics that were caught.")?,

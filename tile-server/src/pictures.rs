@@ -1,5 +1,5 @@
 //! Pictures by their job: from memory, from the object store, or drawn once for all who wait, within limits. Who draws
-//! a picture stores it; this only looks.
+//! a picture stores it; this looks, and says which are stored: tiles, so many bytes a day (docs/decisions/026).
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -7,13 +7,14 @@ use std::time::{Duration, Instant};
 use bytes::Bytes;
 use contract::digest::Digest;
 use contract::encoding::Encoding;
-use contract::job::RenderJob;
+use contract::job::{RenderJob, View};
 use contract::key::ObjectKey;
 use quick_cache::Weighter;
 use quick_cache::sync::Cache;
 use storage::{StorageError, Store};
 use tokio::task::AbortHandle;
 
+use crate::allowance::Allowance;
 use crate::backend::{Draw, Keep, Turn};
 use crate::error::ServerError;
 use crate::gate::{Gate, Pass};
@@ -51,9 +52,21 @@ pub struct Pictures {
 /// The store does not answer.
 struct StoreAway;
 
+/// Bounds of one server's pictures.
+#[derive(Debug, Clone, Copy)]
+pub struct Limits {
+    /// Of those kept in memory.
+    pub memory_bytes: u64,
+    /// Of those that whoever asks has stored.
+    pub stored_bytes_per_day: u64,
+    /// How long anybody waits for one.
+    pub request_limit: Duration,
+}
+
 /// What making one picture needs; shared with the tasks that draw.
 struct Maker {
     store: Store,
+    allowance: Allowance,
     drawer: Arc<dyn Draw>,
     gate: Gate,
     memory: Cache<Digest, Bytes, ByBytes>,
@@ -80,27 +93,28 @@ impl Drop for Waited {
 }
 
 impl Pictures {
-    /// No pictures yet. `memory_bytes` bounds those kept in memory, `request_limit` is how long anybody waits for one.
+    /// No pictures yet.
     pub fn new(
         store: Store,
         drawer: Arc<dyn Draw>,
         gate: Gate,
-        (memory_bytes, request_limit): (u64, Duration),
+        limits: &Limits,
         metrics: Metrics,
     ) -> Self {
         let memory = Cache::with_weighter(
-            (memory_bytes / TYPICAL_BYTES).max(16) as usize,
-            memory_bytes,
+            (limits.memory_bytes / TYPICAL_BYTES).max(16) as usize,
+            limits.memory_bytes,
             ByBytes,
         );
         Self {
             flights: SingleFlight::default(),
             maker: Arc::new(Maker {
                 store,
+                allowance: Allowance::new(limits.stored_bytes_per_day, Instant::now()),
                 drawer,
                 gate,
                 memory,
-                request_limit,
+                request_limit: limits.request_limit,
                 metrics,
             }),
         }
@@ -115,9 +129,8 @@ impl Pictures {
         let maker = &self.maker;
         let digest = job.digest();
         if encoding.is_stored()
-            && let Some(picture) = maker.memory.get(&digest)
+            && let Some(picture) = self.remembered(&digest)
         {
-            maker.metrics.hit(Source::Memory);
             return Ok(picture);
         }
         let refused = |_busy: &ServerError| maker.metrics.refused.inc();
@@ -130,14 +143,33 @@ impl Pictures {
         Ok(picture)
     }
 
+    /// Counts a picture that needs no drawing.
+    pub(crate) fn hit(&self, source: Source) {
+        self.maker.metrics.hit(source);
+    }
+
+    /// The picture of a job, if it lies in memory.
+    pub(crate) fn remembered(&self, digest: &Digest) -> Option<Bytes> {
+        let picture = self.maker.memory.get(digest)?;
+        self.hit(Source::Memory);
+        Some(picture)
+    }
+
     /// The picture of a job, as a PNG. Its digest is the caller's to tell: of a picture that is there it is most of the work.
     pub async fn get(&self, digest: Digest, job: RenderJob) -> Result<Bytes, ServerError> {
-        if let Some(picture) = self.maker.memory.get(&digest) {
-            self.maker.metrics.hit(Source::Memory);
+        if let Some(picture) = self.remembered(&digest) {
             return Ok(picture);
         }
         let maker = Arc::clone(&self.maker);
         self.flights.join(digest, || maker.make(digest, job)).await
+    }
+}
+
+/// Is a picture one of those that are stored? A free camera has no end of views, of which hardly one is asked for twice.
+fn is_tile(job: &RenderJob) -> bool {
+    match job.view {
+        View::Tile { .. } => true,
+        View::Globe { .. } => false,
     }
 }
 
@@ -156,8 +188,11 @@ impl Maker {
             self.metrics.hit(Source::Memory);
             return Ok(picture);
         }
-        let key = job.key();
-        let stored = self.stored(&key).await;
+        let stored = if is_tile(&job) {
+            self.stored(&job.key()).await
+        } else {
+            Ok(None)
+        };
         if let Ok(Some(picture)) = stored {
             self.metrics.hit(Source::Store);
             self.remember(digest, &picture);
@@ -227,7 +262,12 @@ impl Maker {
         turn: Turn,
     ) -> Result<Bytes, ServerError> {
         let Some(limit) = limit else {
-            return self.draw(job, Keep::Yes, Encoding::Png, turn).await;
+            let keep = self.keep(job);
+            let picture = self.draw(job, keep, Encoding::Png, turn).await?;
+            if keep == Keep::Yes {
+                self.allowance.used(picture.len(), Instant::now());
+            }
+            return Ok(picture);
         };
         // It could not be asked for a moment ago; it is stored when it is drawn for the one who asks next.
         let drawn =
@@ -237,6 +277,18 @@ impl Maker {
                 limit_s: limit.as_secs(),
             })
         })
+    }
+
+    fn keep(&self, job: &RenderJob) -> Keep {
+        let why = if !is_tile(job) {
+            "view"
+        } else if !self.allowance.is_left(Instant::now()) {
+            "allowance"
+        } else {
+            return Keep::Yes;
+        };
+        self.metrics.not_stored.with_label_values(&[why]).inc();
+        Keep::No
     }
 
     async fn draw(

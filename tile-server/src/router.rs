@@ -13,7 +13,6 @@ use tower_http::catch_panic::CatchPanicLayer;
 use tower_http::compression::CompressionLayer;
 use tower_http::compression::predicate::{DefaultPredicate, NotForContentType, Predicate};
 use tower_http::cors::{Any, CorsLayer};
-use tower_http::set_header::response::SetMultipleResponseHeadersLayer;
 
 use crate::error::ServerError;
 use crate::middleware::{body, panics::CountPanics, security, track};
@@ -51,9 +50,7 @@ pub fn router(state: AppState) -> Router {
     let timed_out = move |_elapsed: BoxError| async move { ServerError::TimedOut { limit_s } };
     let layers = ServiceBuilder::new()
         .layer(from_fn_with_state(state.clone(), track::count))
-        .layer(SetMultipleResponseHeadersLayer::overriding(
-            security::HEADERS.map(Into::into).into(),
-        ))
+        .map_response(security::with_headers)
         .layer(other_origins)
         .layer(CompressionLayer::new().compress_when(compressible()))
         .layer(CatchPanicLayer::custom(CountPanics(

@@ -7,6 +7,7 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use storage::Store;
 use storage::log::EventLog;
 
+use crate::addresses::Addresses;
 use crate::analyses::Analyses;
 use crate::backend::{Analyse, Draw, Observe};
 use crate::catalogue::Catalogue;
@@ -16,7 +17,7 @@ use crate::error::ServeError;
 use crate::gate::Gate;
 use crate::live::{Freshness, HotTiles, News};
 use crate::metrics::{Metrics, Registry};
-use crate::pictures::Pictures;
+use crate::pictures::{Limits, Pictures};
 use crate::readiness::Readiness;
 use crate::stream;
 
@@ -32,6 +33,8 @@ pub struct Parts {
     pub(crate) cubes: Cubes,
     /// Drawn pictures.
     pub pictures: Pictures,
+    /// Tiles that were asked for.
+    pub(crate) addresses: Addresses,
     /// Series and budgets.
     pub analyses: Analyses,
     /// Asked directly only whether it is ready.
@@ -76,19 +79,18 @@ impl AppState {
         let draws = Gate::new(at_once.get(), settings.draw_queue);
         let analyses = Gate::new(settings.analyses_at_once, settings.analysis_queue);
         let max_age = Duration::from_millis(settings.catalogue_age_ms);
-        let request_limit = Duration::from_secs(settings.request_limit_s);
+        let limits = Limits {
+            memory_bytes: settings.tile_memory_bytes,
+            stored_bytes_per_day: settings.stored_bytes_per_day,
+            request_limit: Duration::from_secs(settings.request_limit_s),
+        };
         // Observations are asked of a database of their own.
         let observing = Gate::new(settings.analyses_at_once, settings.analysis_queue);
         Ok(Self(Arc::new(Parts {
             catalogue: Catalogue::new(store.clone(), max_age, metrics.clone()),
             cubes: Cubes::new(store.clone()),
-            pictures: Pictures::new(
-                store,
-                Arc::clone(&drawer),
-                draws,
-                (settings.tile_memory_bytes, request_limit),
-                metrics.clone(),
-            ),
+            pictures: Pictures::new(store, Arc::clone(&drawer), draws, &limits, metrics.clone()),
+            addresses: Addresses::default(),
             analyses: Analyses::new(analyst, analyses, metrics.clone()),
             drawer,
             observer: OnceLock::new(),

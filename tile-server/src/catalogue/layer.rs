@@ -61,6 +61,16 @@ impl Accumulated {
 }
 
 impl Layer {
+    /// Is it made of the same versions?
+    pub(super) fn is_as(&self, other: &Self) -> bool {
+        let lift = |layer: &Self| {
+            let lift = layer.accumulated.as_ref();
+            lift.map(|lift| (lift.id.clone(), lift.until))
+        };
+        let northward = |layer: &Self| layer.northward.as_ref().map(|part| part.id.clone());
+        self.id == other.id && lift(self) == lift(other) && northward(self) == northward(other)
+    }
+
     /// Modes it can be drawn in. Accumulated carbon lifts the particles of another product; it has none of its own.
     /// Particles drift with both parts of a vector.
     pub fn modes(&self) -> &'static [Mode] {

@@ -84,7 +84,10 @@ impl Reader {
                 accumulated: self.accumulated(&known, manifest, id).await,
                 northward: northward(&known, manifest),
             };
-            layers.insert(product.clone(), Arc::new(layer));
+            // What is the same stays the same thing: whoever holds it sees that at a glance.
+            let kept = before.layers.get(product).filter(|old| old.is_as(&layer));
+            let layer = kept.cloned().unwrap_or_else(|| Arc::new(layer));
+            layers.insert(product.clone(), layer);
         }
         Ok(Snapshot {
             read_at,

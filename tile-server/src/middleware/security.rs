@@ -1,6 +1,6 @@
 //! Headers that tell browsers what the viewer may do: load from here, and nowhere else.
 
-use axum::http::{HeaderName, HeaderValue, header};
+use axum::http::{HeaderName, HeaderValue, Response, header};
 
 /// The globe library makes workers and pictures from `blob:`, and compiles machine code for the browser; its widgets set styles.
 const POLICY: &str = "default-src 'self'; script-src 'self' 'wasm-unsafe-eval'; worker-src 'self' blob:; \
@@ -8,7 +8,7 @@ const POLICY: &str = "default-src 'self'; script-src 'self' 'wasm-unsafe-eval'; 
     base-uri 'self'; form-action 'none'; frame-ancestors 'self'";
 
 /// Those of every answer.
-pub(crate) const HEADERS: [(HeaderName, HeaderValue); 5] = [
+static HEADERS: [(HeaderName, HeaderValue); 5] = [
     (
         header::CONTENT_SECURITY_POLICY,
         HeaderValue::from_static(POLICY),
@@ -31,3 +31,12 @@ pub(crate) const HEADERS: [(HeaderName, HeaderValue); 5] = [
         HeaderValue::from_static("cross-origin"),
     ),
 ];
+
+/// An answer with them. Not by a layer of headers that are made anew for every answer: these never change.
+pub(crate) fn with_headers<B>(mut response: Response<B>) -> Response<B> {
+    let headers = response.headers_mut();
+    for (name, value) in &HEADERS {
+        headers.insert(name, value.clone());
+    }
+    response
+}

@@ -37,26 +37,22 @@ impl Drop for UnderWay {
 pub(crate) async fn count(State(state): State<AppState>, request: Request, next: Next) -> Response {
     let metrics = &state.metrics;
     let started_at = Instant::now();
-    let route = request
-        .extensions()
-        .get::<MatchedPath>()
-        .map_or(FILES, MatchedPath::as_str)
-        .to_owned();
-    let under_way = UnderWay::enter(&metrics.in_flight.with_label_values(&[&route]));
-    let (method, path) = (
-        method_label(request.method()),
-        request.uri().path().to_owned(),
-    );
+    let matched = request.extensions().get::<MatchedPath>().cloned();
+    let route = matched.as_ref().map_or(FILES, MatchedPath::as_str);
+    let under_way = UnderWay::enter(&metrics.in_flight.with_label_values(&[route]));
+    let method = method_label(request.method());
+    let is_logged = tracing::enabled!(tracing::Level::DEBUG);
+    let path = is_logged.then(|| request.uri().path().to_owned());
     let response = next.run(request).await;
     let duration = started_at.elapsed();
     let status = response.status();
     metrics
         .requests
-        .with_label_values(&[&route, method, outcome_label(status)])
+        .with_label_values(&[route, method, outcome_label(status)])
         .inc();
     metrics
         .request_duration_s
-        .with_label_values(&[&route])
+        .with_label_values(&[route])
         .observe(duration.as_secs_f64());
     tracing::debug!(
         http.route = route,
@@ -65,10 +61,10 @@ pub(crate) async fn count(State(state): State<AppState>, request: Request, next:
         duration_ms = duration.as_secs_f64() * 1e3,
         "{method} {status}"
     );
-    let bytes = metrics.sent_bytes.with_label_values(&[&route]);
+    let bytes = metrics.sent_bytes.with_label_values(&[route]);
     let sending = Sending {
         begun: Instant::now(),
-        duration_s: metrics.send_duration_s.with_label_values(&[&route]),
+        duration_s: metrics.send_duration_s.with_label_values(&[route]),
     };
     response.map(|body| {
         Body::new(Sent {

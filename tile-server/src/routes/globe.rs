@@ -22,7 +22,7 @@ use crate::ground::GroundQuery;
 use crate::look::LookQuery;
 use crate::openapi::words;
 use crate::request::{self, Beside};
-use crate::routes::picture::{self, Shown};
+use crate::routes::picture::{Head, Shown};
 use crate::state::AppState;
 use crate::surroundings::SurroundingsQuery;
 
@@ -144,7 +144,8 @@ pub(crate) async fn get(
         asked.pinned_address(&uri)
     };
     let (job, shown) = (asked.job, asked.shown);
-    let mut response = picture::respond(&state, &headers, job, shown, is_pinned).await?;
+    let head = Head::of(&job, &shown, is_pinned);
+    let mut response = head.answer(&state.pictures, &headers, job).await?;
     if let Some(address) = pinned {
         response
             .headers_mut()

@@ -1,8 +1,10 @@
 //! A render job as an answer: the PNG, or "your copy is still right", with the headers caches go by and those that say
 //! what instant is shown.
 
-use axum::http::{HeaderMap, HeaderName, StatusCode, header};
+use axum::body::{Body, Bytes};
+use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse as _, Response};
+use contract::digest::Digest;
 use contract::job::RenderJob;
 use contract::quantity::Quantity;
 use contract::time::{Period, TimeMs};
@@ -10,8 +12,8 @@ use contract::time::{Period, TimeMs};
 use crate::catalogue::Layer;
 use crate::error::ServerError;
 use crate::metrics::Source;
+use crate::pictures::Pictures;
 use crate::request;
-use crate::state::AppState;
 
 /// An address means "the newest version", so a copy may be used unasked only as long as nobody minds a late change.
 pub(crate) const CACHE_CONTROL: &str = "public, max-age=60";
@@ -27,6 +29,9 @@ pub(crate) const COVERED: HeaderName = HeaderName::from_static("fluxglobe-time-c
 pub(crate) const HEIGHTS_END: HeaderName = HeaderName::from_static("fluxglobe-heights-end");
 /// Pixels that heights end at; only on map tiles so deep that heights to scale may be more.
 pub(crate) const HEIGHTS_WITHIN: HeaderName = HeaderName::from_static("fluxglobe-heights-within");
+
+/// Headers that layers add to an answer.
+const MOST_LAYERED: usize = 10;
 
 /// Which instant a picture shows of those that were asked for.
 pub(crate) struct Shown {
@@ -81,34 +86,76 @@ fn heights_headers(job: &RenderJob) -> HeaderMap {
     headers
 }
 
-/// The picture of a job. The entity tag is the job's digest: the same job is the same picture, byte for byte, so a
-/// client that has it is answered without drawing or reading anything.
-pub(crate) async fn respond(
-    state: &AppState,
-    asked: &HeaderMap,
-    job: RenderJob,
-    shown: Shown,
-    is_pinned: bool,
-) -> Result<Response, ServerError> {
-    let digest = job.digest();
-    let tag = format!("\"{digest}\"");
-    let cache_control = if is_pinned {
-        CACHE_CONTROL_PINNED
-    } else {
-        CACHE_CONTROL
-    };
-    let headers = [
-        (header::ETAG, tag.clone()),
-        (header::CACHE_CONTROL, cache_control.to_owned()),
-    ];
-    let told = (shown.headers(), heights_headers(&job));
-    if has_tag(asked, &tag) {
-        state.metrics.hit(Source::Client);
-        return Ok((StatusCode::NOT_MODIFIED, headers, told.0, told.1).into_response());
+/// Everything of an answer but the picture. The entity tag is the job's digest: the same job is the same picture, byte for
+/// byte, so a client that has it is answered without drawing or reading anything.
+pub(crate) struct Head {
+    digest: Digest,
+    tag: String,
+    headers: HeaderMap,
+}
+
+impl Head {
+    pub(crate) fn of(job: &RenderJob, shown: &Shown, is_pinned: bool) -> Self {
+        let digest = job.digest();
+        let tag = format!("\"{digest}\"");
+        let cache_control = if is_pinned {
+            CACHE_CONTROL_PINNED
+        } else {
+            CACHE_CONTROL
+        };
+        let mut headers = shown.headers();
+        headers.extend(heights_headers(job));
+        let printable = tag.parse().expect("digits are printable");
+        headers.insert(header::ETAG, printable);
+        headers.insert(
+            header::CACHE_CONTROL,
+            HeaderValue::from_static(cache_control),
+        );
+        Self {
+            digest,
+            tag,
+            headers,
+        }
     }
-    let picture = state.pictures.get(digest, job).await?;
-    let content = [(header::CONTENT_TYPE, "image/png")];
-    Ok((headers, told.0, told.1, content, picture).into_response())
+
+    /// The answer to a client that has the picture.
+    fn not_modified(&self, pictures: &Pictures, asked: &HeaderMap) -> Option<Response> {
+        has_tag(asked, &self.tag).then(|| {
+            pictures.hit(Source::Client);
+            (StatusCode::NOT_MODIFIED, self.headers.clone()).into_response()
+        })
+    }
+
+    fn over(&self, picture: Bytes) -> Response {
+        let mut response = Response::new(Body::from(picture));
+        let headers = response.headers_mut();
+        // Those that layers add have room.
+        headers.reserve(self.headers.len() + MOST_LAYERED);
+        for (name, value) in &self.headers {
+            headers.insert(name, value.clone());
+        }
+        headers.insert(header::CONTENT_TYPE, HeaderValue::from_static("image/png"));
+        response
+    }
+
+    /// The answer, if nothing must be looked up or drawn for it.
+    pub(crate) fn at_once(&self, pictures: &Pictures, asked: &HeaderMap) -> Option<Response> {
+        self.not_modified(pictures, asked)
+            .or_else(|| Some(self.over(pictures.remembered(&self.digest)?)))
+    }
+
+    /// The answer with the picture of a job, which is the one that this is the head of.
+    pub(crate) async fn answer(
+        &self,
+        pictures: &Pictures,
+        asked: &HeaderMap,
+        job: RenderJob,
+    ) -> Result<Response, ServerError> {
+        if let Some(answer) = self.not_modified(pictures, asked) {
+            return Ok(answer);
+        }
+        Ok(self.over(pictures.get(self.digest, job).await?))
+    }
 }
 
 /// Does `If-None-Match` name the tag? Weak comparison, as RFC 9110, 13.1.2 asks for.

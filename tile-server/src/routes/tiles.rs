@@ -1,14 +1,16 @@
 //! `/tiles/{product}/{mode}/{z}/{x}/{y}.png`: one map tile at any instant.
 
-use axum::extract::State;
-use axum::http::HeaderMap;
+use axum::extract::{FromRequestParts as _, Request, State};
+use axum::http::request::Parts;
+use axum::http::uri::PathAndQuery;
 use axum::response::Response;
-use contract::job::{Mode, View};
+use contract::job::{Mode, RenderJob, View};
 use contract::picture::PictureRequest;
 use contract::tile::Tile;
 use serde::Deserialize;
 use utoipa::IntoParams;
 
+use crate::addresses::KnownTile;
 use crate::annotations::AnnotationsQuery;
 use crate::edition::{Edition, Named};
 use crate::error::ServerError;
@@ -16,7 +18,7 @@ use crate::extract::{NoOthers, UrlPath, UrlQuery, time, whole_number};
 use crate::look::LookQuery;
 use crate::openapi::words;
 use crate::request;
-use crate::routes::picture::{self, Shown};
+use crate::routes::picture::{Head, Shown};
 use crate::state::AppState;
 use crate::surroundings::SurroundingsQuery;
 
@@ -89,10 +91,73 @@ pub(crate) struct TileQuery {
 )]
 pub(crate) async fn get(
     State(state): State<AppState>,
-    UrlPath((product, mode, z, x, y)): UrlPath<(String, String, String, String, String)>,
-    UrlQuery(query): UrlQuery<TileQuery>,
-    headers: HeaderMap,
+    request: Request,
 ) -> Result<Response, ServerError> {
+    let (mut parts, _body) = request.into_parts();
+    if let Some(answer) = again(&state, &parts).await? {
+        return Ok(answer);
+    }
+    let UrlPath(path) = UrlPath::from_request_parts(&mut parts, &state).await?;
+    let UrlQuery(query) = UrlQuery::of(&parts.uri)?;
+    let Read { tile, job, lasts } = read(&state, path, &query).await?;
+    asked(&state, &tile);
+    let asked = &parts.headers;
+    let answer = tile.head.answer(&state.pictures, asked, job).await?;
+    served(&state, &tile);
+    if lasts {
+        state.addresses.remember(address(&parts), tile);
+    }
+    Ok(answer)
+}
+
+fn address(parts: &Parts) -> &str {
+    parts.uri.path_and_query().map_or("", PathAndQuery::as_str)
+}
+
+/// The answer to an address that was read before and whose picture lies in memory, or is the client's own.
+async fn again(state: &AppState, parts: &Parts) -> Result<Option<Response>, ServerError> {
+    let Some(tile) = state.addresses.known(address(parts)) else {
+        return Ok(None);
+    };
+    if !state.catalogue.is_still(&tile.layer).await? {
+        return Ok(None);
+    }
+    let answer = tile.head.at_once(&state.pictures, &parts.headers);
+    if answer.is_some() {
+        asked(state, &tile);
+        served(state, &tile);
+    }
+    Ok(answer)
+}
+
+/// Counts that somebody asks for a tile.
+fn asked(state: &AppState, tile: &KnownTile) {
+    if let Some((view, time)) = &tile.hot {
+        let product = &tile.layer.manifest.product;
+        state.hot.asked(product, tile.mode, view, *time);
+    }
+}
+
+/// Notes that somebody gets it.
+fn served(state: &AppState, tile: &KnownTile) {
+    if tile.mode == Mode::Volume {
+        state.freshness.served(&tile.layer.id);
+    }
+}
+
+/// What an address comes to.
+struct Read {
+    tile: KnownTile,
+    job: RenderJob,
+    /// Is it so as long as its product has no newer version?
+    lasts: bool,
+}
+
+async fn read(
+    state: &AppState,
+    (product, mode, z, x, y): (String, String, String, String, String),
+    query: &TileQuery,
+) -> Result<Read, ServerError> {
     query.annotations.refused_on_tiles()?;
     let manifest = query.manifest.as_deref();
     let layer = state.catalogue.version(&product, manifest).await?;
@@ -121,17 +186,16 @@ pub(crate) async fn get(
     let is_pinned =
         named.is_everything(|| Edition::of(&layer, &request, &beside, &reference_views()))?;
     let shown = Shown::of(&layer, time);
+    let lasts = around.is_empty() && state.catalogue.is_newest(&layer);
     // Who looks at an old version, in colours of their own or at what is not drawn ahead, is no reason to draw a new one.
-    if look.is_usual() && around.is_empty() && state.catalogue.is_newest(&layer) {
-        let product = &layer.manifest.product;
-        let at = time.map(|_asked| shown.time);
-        state.hot.asked(product, mode, &job.view, at);
-    }
-    let response = picture::respond(&state, &headers, job, shown, is_pinned).await?;
-    if mode == Mode::Volume {
-        state.freshness.served(&layer.id);
-    }
-    Ok(response)
+    let hot = (lasts && look.is_usual()).then(|| (job.view, time.map(|_asked| shown.time)));
+    let tile = KnownTile {
+        mode,
+        hot,
+        head: Head::of(&job, &shown, is_pinned),
+        layer,
+    };
+    Ok(Read { tile, job, lasts })
 }
 
 /// The views that editions go by: a tile of every size.

@@ -203,6 +203,45 @@ async fn a_new_version_is_another_picture_and_the_old_one_stays() {
 }
 
 #[tokio::test]
+async fn an_address_that_is_asked_for_again_is_answered_the_same_and_counts_the_same() {
+    let app = TestApp::new().await;
+    let pinned = pinned_tile(&app, "/tiles/flux/volume.json").await;
+    let looks = "/tiles/flux/volume/1/0/0.png?time=2000-02-01&palette=haline";
+    let beyond = "/tiles/flux/volume/1/0/0@2x.png?time=2150";
+    for address in [TILE, &pinned, looks, beyond] {
+        let [first, second, third] = [(); 3].map(|()| app.get(address));
+        let (first, second, third) = (first.await, second.await, third.await);
+        assert_eq!(first.status, StatusCode::OK, "{address}: {}", first.text());
+        assert_eq!(first.headers, second.headers, "{address}");
+        assert_eq!(
+            (&first.body, &second.headers),
+            (&second.body, &third.headers)
+        );
+        let tag = first.header("etag").to_owned();
+        let known = app.get_with(address, &[("if-none-match", &tag)]).await;
+        assert_eq!(known.status, StatusCode::NOT_MODIFIED, "{address}");
+        for name in [
+            "etag",
+            "cache-control",
+            "fluxglobe-time",
+            "fluxglobe-heights-end",
+        ] {
+            assert_eq!(known.header(name), first.header(name), "{address}");
+        }
+    }
+    // What was asked for in its usual look, at one place and instant by two addresses, and at another one.
+    let hot = app.state.hot.of(&"flux".parse().unwrap(), 9, |_time| true);
+    let asked: Vec<_> = hot.iter().map(|tile| tile.asked).collect();
+    assert_eq!(asked, [8, 4]);
+    let hits = r#"fluxglobe_tile_server_cache_hits_total{source="memory"}"#;
+    assert_eq!(app.metric(hits).await, 3 + 2 + 2 + 2);
+    let nothing = app
+        .get("/tiles/flux/volume/1/0/9.png?time=2000-02-01")
+        .await;
+    assert_eq!(nothing.status, StatusCode::BAD_REQUEST);
+}
+
+#[tokio::test]
 async fn the_list_of_products_is_read_no_more_often_than_told() {
     let app = TestApp::with(|settings| settings.catalogue_age_ms = 3_600_000).await;
     let before = app.get(TILE).await;
@@ -251,6 +290,43 @@ async fn whoever_draws_a_picture_is_the_one_who_stores_it() {
     assert_eq!(app.store.get(&key).await.unwrap(), first.body);
     assert_eq!(app.drawer.drawn_count(), 2, "the third time it is there");
     assert_eq!(*app.drawer.keeps.lock().unwrap(), [Keep::Yes, Keep::Yes]);
+}
+
+#[tokio::test]
+async fn a_view_of_a_free_camera_is_remembered_and_not_stored() {
+    let app = TestApp::new().await;
+    let view = "/globe/flux/volume.png?lon=12.5&lat=-3&height_km=5000&time=2000-02-01";
+    let first = app.get(view).await;
+    assert_eq!(first.status, StatusCode::OK, "{}", first.text());
+    assert_eq!(app.get(view).await.body, first.body);
+    assert_eq!(app.drawer.drawn_count(), 1, "the second time from memory");
+    assert_eq!(*app.drawer.keeps.lock().unwrap(), [Keep::No]);
+    for lon in 0..20 {
+        app.get(&format!("/globe/flux/volume.png?lon={lon}")).await;
+    }
+    assert_eq!(app.drawer.drawn_count(), 21);
+    let stored = app.store.list("tiles").await.unwrap();
+    assert!(stored.is_empty(), "strangers fill the store: {stored:?}");
+    let not_stored = r#"fluxglobe_tile_server_not_stored_total{why="view"}"#;
+    assert_eq!(app.metric(not_stored).await, 21);
+}
+
+#[tokio::test]
+async fn tiles_beyond_what_may_be_stored_in_a_day_are_given_out_and_remembered() {
+    let app = TestApp::with(|settings| settings.stored_bytes_per_day = 1).await;
+    let tile = |x: u32| format!("/tiles/flux/map/4/{x}/0.png");
+    for _ in 0..2 {
+        for x in 0..8 {
+            assert_eq!(app.get(&tile(x)).await.status, StatusCode::OK);
+        }
+    }
+    assert_eq!(app.drawer.drawn_count(), 8);
+    // Whoever comes first does not know how large its picture will be.
+    let keeps = app.drawer.keeps.lock().unwrap().clone();
+    assert_eq!(keeps, [&[Keep::Yes][..], &[Keep::No; 7]].concat());
+    assert_eq!(app.store.list("tiles").await.unwrap().len(), 1);
+    let not_stored = r#"fluxglobe_tile_server_not_stored_total{why="allowance"}"#;
+    assert_eq!(app.metric(not_stored).await, 7);
 }
 
 #[tokio::test]

@@ -90,6 +90,8 @@ pub(crate) struct Drawer {
     pub(crate) given: Mutex<Vec<Bytes>>,
     /// While true, what is to be stored is not.
     pub(crate) stores_nothing: AtomicBool,
+    /// Bytes that every picture is longer by.
+    pub(crate) padding_bytes: AtomicUsize,
 }
 
 impl Default for Drawer {
@@ -113,6 +115,7 @@ impl Drawer {
             under_way: AtomicUsize::new(0),
             encodes_slowly: AtomicBool::new(false),
             stores_nothing: AtomicBool::new(false),
+            padding_bytes: AtomicUsize::new(0),
         }
     }
 
@@ -185,10 +188,15 @@ impl Draw for Drawer {
         if matches!(mood, Mood::AnswersNonsense) {
             return Ok(Bytes::from("no picture"));
         }
+        let padding = self.padding_bytes.load(Ordering::SeqCst);
+        let padded = |picture: Bytes| match padding {
+            0 => picture,
+            bytes => [&picture[..], &vec![0; bytes]].concat().into(),
+        };
         if !encoding.is_stored() {
-            return Ok(Self::jpeg_of(job));
+            return Ok(padded(Self::jpeg_of(job)));
         }
-        let picture = Self::picture_of(job);
+        let picture = padded(Self::picture_of(job));
         self.given.lock().unwrap().push(picture.clone());
         if keep == Keep::Yes {
             self.keep(job, &picture).await;

@@ -2,7 +2,7 @@
 
 use std::net::SocketAddr;
 use std::sync::atomic::Ordering;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use axum::body::Bytes;
 use axum::http::StatusCode;
@@ -234,6 +234,34 @@ async fn nobody_who_does_not_look_is_drawn_for() {
     assert_eq!(header["id"], 50);
     let drawn = running.app.drawer.drawn_count();
     assert!(drawn <= 3 + 3 + 1, "{drawn}");
+}
+
+#[tokio::test]
+async fn who_speaks_and_never_listens_is_cut_off() {
+    let running = Running::new(|_usual| {}).await;
+    // More than what lies between two sockets can hold.
+    let padding_bytes = &running.app.drawer.padding_bytes;
+    padding_bytes.store(16 << 20, Ordering::SeqCst);
+    let mut deaf = running.connect().await;
+    let ended = async |reason: &str| {
+        let name = "fluxglobe_tile_server_stream_ended_total";
+        running
+            .app
+            .metric(&format!(r#"{name}{{reason="{reason}"}}"#))
+            .await
+    };
+    let begun = Instant::now();
+    for id in 1.. {
+        let state = json!({"id": id, "view": format!("{VIEW}&roll={}", id % 90)});
+        // Nothing is read here; the server may have hung up.
+        let said = deaf.socket.send(Message::text(state.to_string())).await;
+        if said.is_err() || ended("slow").await > 0 {
+            break;
+        }
+        assert!(begun.elapsed() < LIMIT, "who takes nothing is kept");
+        tokio::time::sleep(Duration::from_millis(100)).await;
+    }
+    assert_eq!((ended("slow").await, ended("silent").await), (1, 0));
 }
 
 #[tokio::test]

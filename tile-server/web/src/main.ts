@@ -67,7 +67,7 @@ const report = (key: string, error: unknown) => connection.report(key, error);
 const sources = new TileSources();
 const stage = new LayerStage(globe.scene, sources, counts, store.state.opacity, {
   onRefused: (error) => report("layer", error),
-  onFailed: (status, url) => void connection.tileFailed(status, url),
+  onFailed: (failure) => void connection.tileFailed(failure),
 });
 const presenter = new Presenter(stage);
 const marks = new Marks(globe.scene);

@@ -66,7 +66,8 @@ export async function getPicture(url: string, signal: AbortSignal, onPart?: (sha
   return new Blob(parts, { type: response.headers.get("content-type") ?? "" });
 }
 
-async function reasonOf(response: Response): Promise<string> {
+/** Why an answer is none, in the server's words if it has any. */
+export async function reasonOf(response: Response): Promise<string> {
   const text = await response.text().catch(() => "");
   try {
     const body = JSON.parse(text) as Partial<Refusal>;

@@ -1,5 +1,6 @@
 //! Double-buffered product layers on the globe: a new instant loads out of sight, then fades in over the old one, so that nothing flashes.
 import { ImageryLayer, type Scene } from "cesium";
+import type { TileFailure } from "../api/again";
 import { underOpacity } from "./fade";
 import { layerKey, type LayerSpec } from "./layer";
 import type { TileSources } from "./sources";
@@ -20,7 +21,7 @@ export interface Trouble {
   /** The server does not say where a layer's tiles are. */
   readonly onRefused: (error: unknown) => void;
   /** A tile did not come. */
-  readonly onFailed: (status: number | undefined, url: string) => void;
+  readonly onFailed: (failure: TileFailure) => void;
 }
 
 /**

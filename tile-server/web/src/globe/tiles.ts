@@ -4,10 +4,13 @@ import {
   type Request,
   RequestErrorEvent,
   RequestState,
+  Resource,
   TileProviderError,
   UrlTemplateImageryProvider,
   WebMercatorTilingScheme,
 } from "cesium";
+import { MOST_TIMES, pauseMs, type TileFailure, waited } from "../api/again";
+import { reasonOf } from "../api/client";
 import { type Bounds, isWhole } from "./box";
 import type { LayerSpec } from "./layer";
 import type { TileSource } from "./sources";
@@ -42,15 +45,22 @@ export class LayerTiles {
   requested = 0;
   failed = 0;
   readonly #requests = new Set<Request>();
+  /** How often a tile was asked for again. */
+  readonly #times = new WeakMap<Resource, number>();
+  readonly #gone = new AbortController();
 
   constructor(
     { bounds }: LayerSpec,
     { template, maxZoom }: TileSource,
     counts: TileCounts,
-    onFailure: (status: number | undefined, url: string) => void,
+    onFailure: (failure: TileFailure) => void,
   ) {
     const provider = new UrlTemplateImageryProvider({
-      url: template,
+      url: new Resource({
+        url: template,
+        retryAttempts: MOST_TIMES,
+        retryCallback: (tile, error) => this.#isAskedAgain(tile, error),
+      }),
       tilingScheme: new WebMercatorTilingScheme(),
       tileWidth: TILE_PX,
       tileHeight: TILE_PX,
@@ -61,12 +71,13 @@ export class LayerTiles {
     this.provider = provider;
     this.#countRequests(provider, counts);
     provider.errorEvent.addEventListener((error: TileProviderError) => {
+      if (this.#gone.signal.aborted) return;
       const cause: unknown = error.error;
       const url = template
         .replace("{z}", String(error.level))
         .replace("{x}", String(error.x))
         .replace("{y}", String(error.y));
-      onFailure(cause instanceof RequestErrorEvent ? cause.statusCode : undefined, url);
+      onFailure({ status: cause instanceof RequestErrorEvent ? cause.statusCode : undefined, url, reason: saidBy(cause) });
     });
   }
 
@@ -77,8 +88,20 @@ export class LayerTiles {
 
   /** Nobody looks at this layer any more: Cesium itself would wait for what it asked for. */
   cancel(): void {
+    this.#gone.abort();
     // The library's declarations leave this one out.
     for (const request of this.#requests) (request as Request & { cancel(): void }).cancel();
+  }
+
+  /** Until the time that a busy server names a tile is on its way like any other; then Cesium asks for it again. */
+  async #isAskedAgain(tile: Resource | undefined, error: unknown): Promise<boolean> {
+    const times = tile && this.#times.get(tile);
+    const pause = pauseMs(retryAfterOf(error), times ?? 0);
+    if (!tile || pause === undefined) return false;
+    this.#times.set(tile, (times ?? 0) + 1);
+    // Put off for want of a connection, it would be taken for one that failed.
+    (tile.request as { throttleByServer: boolean }).throttleByServer = false;
+    return waited(pause, this.#gone.signal);
   }
 
   /** The provider's own method is kept and only watched: Cesium decides what to ask for and when. */
@@ -101,7 +124,7 @@ export class LayerTiles {
         () => end({ loaded: 1 }),
         () => {
           // Cesium calls requests off when nearer ground needs the line, and asks again later: that is no failure.
-          const isCalledOff = req?.state === RequestState.CANCELLED;
+          const isCalledOff = req?.state === RequestState.CANCELLED || this.#gone.signal.aborted;
           if (isCalledOff) this.requested -= 1;
           end(isCalledOff ? {} : { failed: 1 });
         },
@@ -109,6 +132,19 @@ export class LayerTiles {
       return promise;
     };
   }
+}
+
+function retryAfterOf(error: unknown): string | undefined {
+  if (!(error instanceof RequestErrorEvent)) return undefined;
+  // Proxies that speak HTTP/1.1 write names as they like.
+  const headers = Object.entries((error.responseHeaders ?? {}) as Record<string, string>);
+  return headers.find(([name]) => name.toLowerCase() === "retry-after")?.[1];
+}
+
+function saidBy(error: unknown): Promise<string> | undefined {
+  if (!(error instanceof RequestErrorEvent) || retryAfterOf(error) === undefined) return undefined;
+  const body = error.response instanceof Blob ? error.response : null;
+  return reasonOf(new Response(body, { status: error.statusCode ?? 503 }));
 }
 
 function rectangleOf(bounds: Bounds): Rectangle {

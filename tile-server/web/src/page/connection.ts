@@ -1,4 +1,5 @@
 //! Watches for a server that went away: a failed request starts it, the health address ends it, and the page then asks again.
+import type { TileFailure } from "../api/again";
 import { ApiError, getJson } from "../api/client";
 import { healthUrl } from "../api/requests";
 import type { Notices } from "./notices";
@@ -26,11 +27,16 @@ export class Connection {
     else this.#notices.show(key, error instanceof Error ? error.message : String(error));
   }
 
-  /** A tile failed: ask its address once more as JSON, because a picture's failure carries no reason. */
-  async tileFailed(status: number | undefined, url: string): Promise<void> {
+  /** A tile failed: ask its address once more as JSON, unless that was said already or it is not time to ask. */
+  async tileFailed({ status, url, reason }: TileFailure): Promise<void> {
     if (this.#isLost) return;
     if (status === undefined || status === 0) {
       this.#lost();
+      return;
+    }
+    if (reason) {
+      this.#onTrouble();
+      this.report("tiles", new Error(`Pictures are missing: ${await reason}`));
       return;
     }
     try {
