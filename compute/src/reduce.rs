@@ -24,4 +24,3 @@ mod weighed;
 pub use answer::{statistics, statistics_of};
 pub(crate) use over_steps::{RegionOnGrid, sums_over_region};
 pub(crate) use region_sums::RegionStepSums;
-

@@ -229,9 +229,15 @@ mod tests {
             }
             let held = (0..2).map(|run| runs.held_count(run, &own[..count]));
             let held: usize = held.sum();
-            assert!(count - held < LEAST_NEW.max(RUN_STEPS / 3), "{count} {held}");
+            assert!(
+                count - held < LEAST_NEW.max(RUN_STEPS / 3),
+                "{count} {held}"
+            );
         }
-        assert_eq!(made, [16, 32, 48, 72, 108, 128, 144, 160, 176, 200, 236, 256]);
+        assert_eq!(
+            made,
+            [16, 32, 48, 72, 108, 128, 144, 160, 176, 200, 236, 256]
+        );
         let at_200 = Runs::default().with(1, name_of(1, &own[..200]).unwrap());
         assert_eq!(at_200.held_count(1, &own), 72);
         assert_eq!(at_200.held_count(1, &own[..199]), 0, "a step is gone");

@@ -1,4 +1,4 @@
-//! Some rows of a stored series or field: of its file the pages that hold them, decompressed and compared with their checks.
+//! Some rows of a stored field: of its file the pages that hold them, decompressed and compared with their checks.
 //! Nothing else of the file is read once its footer is known.
 //!
 //! Files of before rows had checks or pages of their own are read whole.
@@ -24,8 +24,8 @@ use crate::off_thread::off_thread;
 use crate::row_check::RowCheck;
 use crate::sound::damage;
 
-/// What is read of a file's end at first: the footer and the index of pages of a year's series of 4,000 blocks.
-const TAIL_BYTES: usize = 256 << 10;
+/// What is read of a file's end at first: the footer and the index of pages of a field of a hundred chunks.
+const TAIL_BYTES: usize = 16 << 10;
 
 /// A stored object, and where queries read it.
 #[derive(Debug, Clone)]

@@ -79,7 +79,9 @@ pub(crate) async fn sums_over_region(
         let mut found = found.regions;
         for step in asked {
             let own = found.remove(&step);
-            sums.push(own.ok_or_else(|| ComputeError::inconsistent("sums", "a step was not summed"))?);
+            sums.push(
+                own.ok_or_else(|| ComputeError::inconsistent("sums", "a step was not summed"))?,
+            );
         }
     }
     Ok(sums)

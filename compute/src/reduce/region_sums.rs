@@ -223,7 +223,9 @@ mod tests {
 
     fn sums(order: &[usize]) -> Vec<RegionStepSums> {
         let (cells, seconds) = (cells(), [86_400.0, 7e5, 1.0]);
-        let runs = order.iter().flat_map(|cell| (0..STEPS).map(move |step| value(cell * STEPS + step)));
+        let runs = order
+            .iter()
+            .flat_map(|cell| (0..STEPS).map(move |step| value(cell * STEPS + step)));
         let values: Vec<f32> = runs.collect();
         let own: Vec<CellArea> = order.iter().map(|cell| cells[*cell]).collect();
         let block = Values {
@@ -296,7 +298,10 @@ mod tests {
             };
             let mut out = vec![RegionStepSums::default()];
             let mut scratch = RegionScratch::new(1);
-            assert!(scratch.add(block, &cells, &[1e9], &mut out).is_err(), "{bad}");
+            assert!(
+                scratch.add(block, &cells, &[1e9], &mut out).is_err(),
+                "{bad}"
+            );
         }
     }
 }

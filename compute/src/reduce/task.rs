@@ -303,7 +303,10 @@ impl Worker {
                 let first = piece.first_step as usize;
                 let all = first + piece.steps.start as usize..first + piece.steps.end as usize;
                 let steps = &values.manifest().steps[all];
-                steps.iter().map(|step| measure.seconds(step.period)).collect()
+                steps
+                    .iter()
+                    .map(|step| measure.seconds(step.period))
+                    .collect()
             }
             (Layout::Blocks, None) => vec![],
         }
@@ -320,11 +323,19 @@ impl Worker {
         match &self.question.wanted {
             Wanted::RegionSums { grid, .. } => {
                 let areas = cells.areas(window, grid);
-                CellShares::Areas(if is_block { block(areas, window) } else { areas })
+                CellShares::Areas(if is_block {
+                    block(areas, window)
+                } else {
+                    areas
+                })
             }
             Wanted::Sums { .. } | Wanted::Histograms { .. } => {
                 let weights = cells.window(window);
-                CellShares::Weights(if is_block { block(weights, window) } else { weights })
+                CellShares::Weights(if is_block {
+                    block(weights, window)
+                } else {
+                    weights
+                })
             }
         }
     }
@@ -409,10 +420,11 @@ impl<'a> Reduction<'a> {
         let first = self.piece.first_step + self.piece.steps.start;
         if let Some(sums) = self.sums {
             let sums = sums.finish();
-            let sums =
-                sums.map_err(|e| ComputeError::inconsistent(self.piece.key.as_str(), e))?;
+            let sums = sums.map_err(|e| ComputeError::inconsistent(self.piece.key.as_str(), e))?;
             let own = (first..).zip(sums);
-            self.all.steps.extend(own.filter(|(_, sums)| sums.count > 0));
+            self.all
+                .steps
+                .extend(own.filter(|(_, sums)| sums.count > 0));
         }
         self.all.regions.extend((first..).zip(self.regions));
         Ok(self.all)

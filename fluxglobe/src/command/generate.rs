@@ -47,12 +47,7 @@ fn of_year(output: &Path, year: u16) -> PathBuf {
 }
 
 /// Writes the synthetic China Sea with a progress bar.
-pub(crate) fn china_sea(
-    output: &Path,
-    scale: f64,
-    seed: u64,
-    steps: GeneratedSteps,
-) -> Result<()> {
+pub(crate) fn china_sea(output: &Path, scale: f64, seed: u64, steps: GeneratedSteps) -> Result<()> {
     let bar = progress::bar("generate China Sea", 12);
     ingest::generate_china_sea(output, scale, seed, steps, &|done, all| {
         bar.set_length(all as u64);

@@ -33,8 +33,9 @@ pub(super) fn write(
 ) -> hdf5::Result<()> {
     let file = create(path)?;
     let generator = format!("fluxglobe china-sea, seed {seed}");
-    let title =
-        format!("SYNTHETIC China Sea air-sea CO2 flux{years}: made up by a program, no measurement");
+    let title = format!(
+        "SYNTHETIC China Sea air-sea CO2 flux{years}: made up by a program, no measurement"
+    );
     texts(
         &file,
         &[

@@ -76,7 +76,9 @@ fn blocks_side_by_side_and_runs_in_pieces_have_the_sums_of_their_cells() {
                 first: 4,
             };
             alone.add(own, &[*weight], 0..1).unwrap();
-            alone.add(Values { first: 1, ..own }, &[*weight], 1..4).unwrap();
+            alone
+                .add(Values { first: 1, ..own }, &[*weight], 1..4)
+                .unwrap();
             for (sum, more) in one_by_one.iter_mut().zip(alone.finish().unwrap()) {
                 sum.merge(&more).unwrap();
             }
