@@ -91,7 +91,7 @@ faults: checkout test-tools $(viewer) ## kill -9 of every kind of process, 60 ti
 	deploy/services/services.sh install
 	FLUXGLOBE_KILLS=60 cargo test --locked -p tests --test cluster killed -- --nocapture
 
-bench: build ## Measure beside peers (ARGS=tiles: thematic tiles beside titiler-xarray; more options after the name)
+bench: build ## Measure beside peers (ARGS=tiles: titiler-xarray; ARGS=stats: xarray and dask, 16 years; more options after the name)
 	deploy/install-tools.sh bench
 	$(FLUXGLOBE_TOOLS)/peers/bin/python -B tests/bench/$(firstword $(ARGS) tiles).py --program $(fluxglobe) $(wordlist 2,99,$(ARGS))
 

@@ -6,6 +6,7 @@ pub mod bands;
 pub mod chunk;
 pub mod fixed;
 pub mod gaps;
+mod measure;
 pub mod named;
 pub(crate) mod over_region;
 mod query;
@@ -13,5 +14,5 @@ pub mod rows;
 pub mod running;
 pub mod sums;
 
-pub use asked::Measure;
+pub use measure::Measure;
 pub use query::{budget, budget_of};

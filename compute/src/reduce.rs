@@ -19,6 +19,7 @@ mod run;
 mod scale;
 pub(crate) mod task;
 mod tasks;
+mod values;
 mod weighed;
 
 pub use answer::{statistics, statistics_of};

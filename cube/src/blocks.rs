@@ -65,12 +65,12 @@ impl Blocks {
         array: Array<AsyncIcechunkStore>,
         description: &Description,
         place: &str,
-    ) -> Result<Self, CubeError> {
+    ) -> Self {
         let [rows, cols] = Layout::of(&description.grid).series_object();
         let shard = [rows / BLOCK_CELLS, cols / BLOCK_CELLS];
         let entries = u64::from(shard[0] * shard[1]);
         let index_bytes = entries * size_of::<[u32; 2]>() as u64;
-        Ok(Self {
+        Self {
             array,
             shard,
             indexes: Cache::with_weighter(
@@ -79,7 +79,7 @@ impl Blocks {
                 IndexWeight,
             ),
             place: place.to_owned(),
-        })
+        }
     }
 
     /// Name of the array.

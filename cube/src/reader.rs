@@ -65,7 +65,7 @@ impl Cube {
         } else {
             let definition = arrays::series(&description, runs.len())?;
             let series = axis::open(&store, &definition, place).await?;
-            Some(Blocks::new(series, &description, place)?)
+            Some(Blocks::new(series, &description, place))
         };
         let held = (0..runs.len()).map(|run| runs.held_count(run, &steps));
         Ok(Self(Arc::new(Inner {

@@ -3,35 +3,14 @@
 
 use contract::grid::Grid;
 use contract::manifest::{Manifest, Step};
-use contract::time::Period;
-use serde::{Deserialize, Serialize};
 
 use super::bands::{BAND_COUNT, band_areas};
+use super::measure::Measure;
 use super::rows::StepSum;
 use crate::reduce::{RegionOnGrid, sums_over_region};
 use crate::region::address::RegionAddress;
 use crate::region::loaded::weights_failed;
 use crate::{ComputeError, Engine};
-
-/// What is summed over cells.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Measure {
-    /// Flux x area x time: a mass, kg.
-    Mass,
-    /// Value x area: what a mean is made of.
-    Mean,
-}
-
-impl Measure {
-    /// What values of a step are multiplied with besides the area. Of the whole step: parts of it are shared out afterwards, exactly.
-    pub(crate) fn seconds(self, period: Period) -> f64 {
-        match self {
-            Self::Mass => period.seconds(),
-            Self::Mean => 1.0,
-        }
-    }
-}
 
 /// A region on a grid, its weights read.
 pub(super) struct WeighedRegion {

@@ -5,7 +5,7 @@ use contract::manifest::Manifest;
 use contract::region::{NAMED_REGIONS, Region};
 use storage::Store;
 
-use super::asked::Measure;
+use super::measure::Measure;
 use super::sums::{self, StoredSums};
 use crate::region::weights::{self, EARTH, RegionKeys};
 use crate::{ComputeError, Engine};

@@ -6,8 +6,8 @@ use contract::earth::Earth;
 use contract::manifest::{Manifest, Step};
 use contract::region::Region;
 
-use super::asked::Measure;
 use super::fixed::AREA_DECIMALS;
+use super::measure::Measure;
 use super::sums::{self, RegionSums};
 use crate::region::address::RegionAddress;
 use crate::region::extent::{Extent, extent, outline};

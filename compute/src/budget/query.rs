@@ -7,8 +7,8 @@ use contract::time::Period;
 use storage::manifests;
 
 use super::accumulated;
-use super::asked::Measure;
 use super::gaps::BASIS;
+use super::measure::Measure;
 use super::over_region::{AskedArea, over_region};
 use super::rows::{Asked, row_periods, rows};
 use crate::{ComputeError, Engine, catalogue};

@@ -10,8 +10,9 @@ use contract::time::{Period, TimeMs};
 use serde::{Deserialize, Serialize};
 use storage::{StorageError, Store, document, manifests};
 
-use super::asked::{Measure, WeighedRegion, asked};
+use super::asked::{WeighedRegion, asked};
 use super::bands::{BAND_COUNT, BandSum};
+use super::measure::Measure;
 use super::rows::StepSum;
 use crate::region::address::RegionAddress;
 use crate::region::weights::RegionKeys;

@@ -14,7 +14,7 @@ use cube::Values;
 use super::accumulator::{Accumulated, too_large};
 use super::bins::{BinSums, bin_sums};
 use super::percentiles::Searches;
-use super::run::run;
+use super::run::{opened, run};
 use super::scale::Scale;
 use super::task::{Question, Wanted};
 use super::tasks::Version;
@@ -71,18 +71,6 @@ pub async fn statistics_of(
     let rows = bins.iter().enumerate().map(|(at, bin)| rows.row(at, bin));
     let rows: Vec<StatisticsRow> = rows.collect();
     Ok(answer((manifest, id), query, weighed, rows))
-}
-
-/// The version along time; a cluster's executors read its fields instead.
-pub(super) async fn opened(
-    engine: &Engine,
-    manifest: &Manifest,
-    id: &ManifestId,
-) -> Result<Option<Values>, ComputeError> {
-    if engine.is_distributed() {
-        return Ok(None);
-    }
-    engine.values(manifest, id).await.map(Some)
 }
 
 fn answer(

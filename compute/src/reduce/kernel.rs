@@ -8,25 +8,8 @@ use super::accumulator::StepSums;
 use super::cells::CellWeight;
 use super::histogram::{Buckets, Histograms};
 use super::scale::{Scale, nearest};
+use super::values::Values;
 use crate::budget::fixed::OutOfRange;
-
-/// Values of some cells, `[cell, step]`, stored unit, NaN no data.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Values<'a> {
-    pub(super) values: &'a [f32],
-    /// Steps of every cell.
-    pub(super) step_count: usize,
-    /// The first one that is summed, of them.
-    pub(super) first: usize,
-}
-
-impl Values<'_> {
-    /// Steps of a cell that are summed, as many as `count`.
-    pub(super) fn steps(&self, cell: usize, count: usize) -> &[f32] {
-        let start = cell * self.step_count + self.first;
-        &self.values[start..start + count]
-    }
-}
 
 /// Sums of cells of equal weight by step, before they are multiplied with it.
 #[derive(Debug, Default)]

@@ -4,10 +4,9 @@ use std::sync::Arc;
 
 use contract::manifest::{Manifest, Step};
 
-use super::answer::opened;
 use super::cells::{Cells, WeightUnit};
 use super::region_sums::RegionStepSums;
-use super::run::run;
+use super::run::{opened, run};
 use super::scale::Scale;
 use super::task::{Question, Wanted};
 use super::tasks::Version;

@@ -6,7 +6,7 @@
 use std::collections::BTreeMap;
 
 use super::bytes::Reader;
-use super::kernel::Values;
+use super::values::Values;
 use crate::budget::bands::{BAND_COUNT, BandSum};
 use crate::budget::chunk::{AREA_STEPS_PER_M2, MASS_STEPS_PER_KG};
 use crate::budget::fixed::{OutOfRange, to_steps};

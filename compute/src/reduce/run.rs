@@ -6,6 +6,7 @@ use std::collections::BTreeSet;
 
 use contract::digest::Digest;
 use contract::key::ObjectKey;
+use contract::manifest::{Manifest, ManifestId};
 use cube::Values;
 use datafusion::arrow::array::{Array as _, AsArray as _, RecordBatch};
 use futures::{StreamExt as _, TryStreamExt as _, stream};
@@ -31,6 +32,18 @@ pub(super) async fn run(
     } else {
         in_process(engine, question, values, pieces).await
     }
+}
+
+/// The version along time; a cluster's executors read its fields instead.
+pub(super) async fn opened(
+    engine: &Engine,
+    manifest: &Manifest,
+    id: &ManifestId,
+) -> Result<Option<Values>, ComputeError> {
+    if engine.is_distributed() {
+        return Ok(None);
+    }
+    engine.values(manifest, id).await.map(Some)
 }
 
 async fn in_process(

@@ -11,7 +11,6 @@ use compute::budget::chunk::{mass_steps, valid_area_steps};
 use compute::budget::fixed::{MASS_DECIMALS, decimal_text};
 use compute::region::weights;
 use compute::{Engine, Objects};
-use contract::budget::BudgetQuery;
 use contract::chunk::field_chunks;
 use contract::earth::Earth;
 use contract::grid::Grid;
