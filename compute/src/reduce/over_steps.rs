@@ -37,7 +37,9 @@ pub(crate) async fn sums_over_region(
         let found = manifest
             .steps
             .binary_search_by_key(&start, |own| own.period.start);
-        found.map_err(|_| ComputeError::inconsistent("sums", "a step is not the version's"))
+        found
+            .ok()
+            .ok_or_else(|| ComputeError::inconsistent("sums", "a step is not the version's"))
     };
     let at: Vec<usize> = steps.iter().map(at).collect::<Result<_, _>>()?;
     let id = manifest.id();

@@ -148,7 +148,8 @@ impl RegionScratch {
                 self.band = own.band;
             }
             let values = block.steps(cell, seconds.len());
-            if own.whole_m2 == own.sea_m2 {
+            // The same number where all of it is sea.
+            if own.whole_m2.to_bits() == own.sea_m2.to_bits() {
                 add_cell(values, own.whole_m2, seconds, &mut self.both)?;
             } else {
                 add_cell(values, own.whole_m2, seconds, &mut self.whole)?;
@@ -203,7 +204,11 @@ mod tests {
 
     fn cells() -> Vec<CellArea> {
         let cell = |at: usize| CellArea {
-            whole_m2: if at % 5 == 0 { 0.0 } else { 1e9 + at as f64 },
+            whole_m2: if at.is_multiple_of(5) {
+                0.0
+            } else {
+                1e9 + at as f64
+            },
             sea_m2: match at % 5 {
                 0 => 0.0,
                 1 => 3e8,
@@ -229,7 +234,7 @@ mod tests {
         let values: Vec<f32> = runs.collect();
         let own: Vec<CellArea> = order.iter().map(|cell| cells[*cell]).collect();
         let block = Values {
-            values: &values,
+            of: &values,
             step_count: STEPS,
             first: 1,
         };
@@ -292,7 +297,7 @@ mod tests {
         }];
         for bad in [f32::INFINITY, f32::NEG_INFINITY, f32::MAX] {
             let block = Values {
-                values: &[bad],
+                of: &[bad],
                 step_count: 1,
                 first: 0,
             };

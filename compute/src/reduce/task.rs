@@ -247,7 +247,7 @@ impl Worker {
             let cells = self.cells_of(windows[piece.rows[number] as usize], true);
             let added = blocks.pieces().iter().try_for_each(|run| {
                 let run_values = Values {
-                    values,
+                    of: values,
                     step_count: RUN_STEPS,
                     first: run.in_run,
                 };
@@ -284,7 +284,7 @@ impl Worker {
         each(&mut |row: u32, values: &[f32]| {
             let cells = self.cells_of(windows[row as usize], false);
             let own = Values {
-                values,
+                of: values,
                 step_count: steps.len(),
                 first: steps.start,
             };

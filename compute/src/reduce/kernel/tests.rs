@@ -27,7 +27,7 @@ fn values() -> Vec<f32> {
 
 fn block(values: &[f32]) -> Values<'_> {
     Values {
-        values,
+        of: values,
         step_count: STEPS,
         first: 1,
     }
@@ -71,7 +71,7 @@ fn blocks_side_by_side_and_runs_in_pieces_have_the_sums_of_their_cells() {
         for (cell, weight) in cells.iter().enumerate() {
             let mut alone = Summing::new(4, scale, true);
             let own = Values {
-                values: &values[cell * STEPS..][..STEPS],
+                of: &values[cell * STEPS..][..STEPS],
                 step_count: STEPS,
                 first: 4,
             };
