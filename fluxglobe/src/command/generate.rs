@@ -1,4 +1,4 @@
-//! `fluxglobe generate`: a size and a seed in, a synthetic file out.
+//! `fluxglobe generate`: a size and a seed in, a synthetic file out, or one a year.
 
 use std::path::{Path, PathBuf};
 
