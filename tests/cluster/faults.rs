@@ -340,12 +340,12 @@ fn assert_as_undisturbed(cluster: &Cluster, sender: &Sender) {
 /// One `granule.landed` for each file that counts in the end, at most one for each that a newer edition replaced, and
 /// one `product.derived` for each of them.
 fn each_file_told_once(cluster: &Cluster, sender: &Sender) {
-    let mut landed: BTreeMap<String, usize> = BTreeMap::new();
-    for event in events(cluster, Topic::GranuleLanded) {
-        if let Body::GranuleLanded { path, .. } = event.body {
-            *landed.entry(path).or_default() += 1;
-        }
-    }
+    let told = |cluster: &Cluster| {
+        let landed = landed_events(cluster).values().sum();
+        Ok((derived_traces(cluster) >= landed).then_some(()))
+    };
+    cluster.wait_for("derivations told", LIMIT, told).unwrap();
+    let landed = landed_events(cluster);
     let doubled: Vec<_> = landed.iter().filter(|(_, count)| **count > 1).collect();
     assert!(doubled.is_empty(), "{doubled:?}");
     for file in sender.newest() {
@@ -356,7 +356,7 @@ fn each_file_told_once(cluster: &Cluster, sender: &Sender) {
     assert_eq!(
         derived_traces(cluster),
         landed.len(),
-        "a granule has no derivation"
+        "not one derivation for each granule"
     );
 }
 
@@ -407,13 +407,13 @@ pub(crate) fn until_whole(cluster: &Cluster, months: usize) {
 }
 
 /// One `granule.landed` and one `product.derived` for each granule.
+///
+/// A version is there before it is told of, longer so when a store that failed in between is asked again: events are waited
+/// for, and are then neither fewer nor more.
 pub(crate) fn each_event_once(cluster: &Cluster, files: &[PathBuf]) {
-    let mut landed: BTreeMap<String, usize> = BTreeMap::new();
-    for event in events(cluster, Topic::GranuleLanded) {
-        if let Body::GranuleLanded { path, .. } = event.body {
-            *landed.entry(path).or_default() += 1;
-        }
-    }
+    let told = |cluster: &Cluster| Ok((derived_traces(cluster) >= files.len()).then_some(()));
+    cluster.wait_for("derivations told", LIMIT, told).unwrap();
+    let mut landed = landed_events(cluster);
     for file in files {
         let count = landed.remove(&file.display().to_string()).unwrap_or(0);
         assert_eq!(count, 1, "events of {}", file.display());
@@ -423,8 +423,19 @@ pub(crate) fn each_event_once(cluster: &Cluster, files: &[PathBuf]) {
     assert_eq!(
         derived_traces(cluster),
         files.len(),
-        "a granule has no derivation"
+        "not one derivation for each granule"
     );
+}
+
+/// How often a file was told of as landed.
+fn landed_events(cluster: &Cluster) -> BTreeMap<String, usize> {
+    let mut landed = BTreeMap::new();
+    for event in events(cluster, Topic::GranuleLanded) {
+        if let Body::GranuleLanded { path, .. } = event.body {
+            *landed.entry(path).or_default() += 1;
+        }
+    }
+    landed
 }
 
 /// Of how many granules a derivation was told: granules that are derived together share a version; each still has its own
