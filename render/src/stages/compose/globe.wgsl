@@ -96,7 +96,7 @@ fn threshold(place: vec2<u32>) -> u32 {
 }
 
 // Straight-alpha sRGB in RGBA8, red lowest, of premultiplied linear light. What is seen beside a globe is dithered: air and sky
-// are smoother than bytes. Elsewhere colours are as they come, which files pack better.
+// are smoother than bytes. Why nothing else is: docs/method.md, "Air".
 fn bytes_of(colour: vec4<f32>, pixel: vec2<u32>, is_dithered: bool) -> u32 {
     let alpha = u32(clamp(colour.w, 0.0, 1.0) * 255.0 + 0.5);
     if (alpha == 0u) { return 0u; }
