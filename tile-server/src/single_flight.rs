@@ -1,4 +1,6 @@
 //! Single flight: whoever asks for what is being made already waits for that one answer.
+//!
+//! Our own, since in `quick_cache::get_or_insert_async` the work is the first caller's: who waits begins anew when he leaves.
 
 use std::collections::HashMap;
 use std::future::Future;

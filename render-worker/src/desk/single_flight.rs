@@ -1,4 +1,7 @@
 //! Equal jobs are one: the first caller begins it, the others wait with him, and it ends when all have gone.
+//!
+//! Our own, since in `quick_cache::get_or_insert_async` the work is the first caller's: who waits begins anew when he leaves. And
+//! whoever waits for a batch job makes it urgent.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
