@@ -58,7 +58,7 @@ viewer: $(viewer)
 
 $(viewer): $(viewer_sources) | tools
 	@deploy/check-node.sh
-	# Not `npm ci`: it insists on other platforms' optional packages, which a partial mirror lacks. The lock file holds.
+	# Not `npm ci`: it fails without other platforms' optional packages, which a partial mirror lacks. The lock file holds.
 	cd tile-server/web && npm install --no-save --no-audit --no-fund && npm run build
 
 tools:

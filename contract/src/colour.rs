@@ -39,6 +39,7 @@ pub struct TransferFunction {
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub reversed: bool,
     /// Colours in place of the palette's, by stored value.
+    // Stored objects keep this spelling, and so do the digests of jobs that name pictures.
     #[serde(rename = "colors", default, skip_serializing_if = "Stops::is_empty")]
     pub colours: Stops<Rgb>,
     /// Share of the style's optical depth, and of a map's opacity, in place of the usual one, by stored value.

@@ -27,7 +27,7 @@ launch_cluster() {
         say 'formatting its data folder'
         format=(-format)
     fi
-    # Hadoop insists on an address for the machine's own name, which not every container has; it needs no other names.
+    # Hadoop needs an address for the machine's own name, which not every container has, and no other names.
     printf '127.0.0.1 localhost %s\n' "$HOSTNAME" >"$run/hosts"
     launch "$java" "-Xmx$heap" "${small_java[@]}" \
         -Djava.net.preferIPv4Stack=true "-Djdk.net.hosts.file=$run/hosts" -Dfluxglobe.log=INFO \

@@ -118,7 +118,7 @@ start_once() {
     wait_until_ready "$check"
 }
 
-# stop_with SIGNAL: asks, waits, and insists when asking did not help.
+# stop_with SIGNAL: sends it, waits, and kills what is still there.
 stop_with() {
     local pid until=$((SECONDS + stop_limit_s))
     if pid=$(running_pid); then

@@ -37,7 +37,7 @@ impl Adapter {
             kind,
             driver: driver.trim().to_owned(),
             pci_address: Some(info.device_pci_bus_id.clone()).filter(|id| !id.is_empty()),
-            // A program on the processor has the computer's memory.
+            // A software adapter, a program on the processor, has the computer's memory.
             own_bytes: own_bytes.filter(|_| !kind.is_software()),
         }
     }
@@ -101,7 +101,7 @@ impl Adapter {
         }
     }
 
-    /// Is it a program on the processor, such as lavapipe?
+    /// Is it a software adapter: a program on the processor, such as lavapipe?
     pub fn is_software(&self) -> bool {
         self.kind.is_software()
     }

@@ -12,7 +12,7 @@ pub enum RenderError {
     NoAdapter,
     /// There is a software adapter alone, where a graphics card is required.
     #[error(
-        "a graphics card is required and there is none: the only Vulkan adapter is {adapter}, a program on the processor; \
+        "a graphics card is required and there is none: the only Vulkan adapter is {adapter}, a software adapter; \
          give this machine or container a card and its driver, or start without --require-gpu"
     )]
     SoftwareAdapter { adapter: String },

@@ -140,7 +140,7 @@ impl Gpu {
         self.adapter.name()
     }
 
-    /// Is the adapter a program on the processor, such as lavapipe?
+    /// Is it a software adapter: a program on the processor, such as lavapipe?
     pub fn is_software(&self) -> bool {
         self.adapter.is_software()
     }

@@ -418,7 +418,7 @@ fn behind(camera: &Camera) -> DVec3 {
 
 /// How often an outline goes round a place, anticlockwise seen from above; it does not hold the place opposite as well.
 fn turns_round(place: DVec3, ring: &Ring) -> i32 {
-    // The axes of eq. 4 are left-handed: their pair goes round clockwise.
+    // The axes of eq. 4 (docs/method.md) are left-handed: their pair goes round clockwise.
     let (along, across) = place.any_orthonormal_pair();
     let azimuth = |corner: DVec3| corner.dot(along).atan2(corner.dot(across));
     let ends = ring.corners.iter().zip(ring.corners.iter().cycle().skip(1));
