@@ -179,7 +179,7 @@ unit_without_remarks() {
     ! [ -s "$work/remarks" ]
 }
 
-gallery() { python3 -B ../gallery/make.py --check --list "$1"; }
+gallery() { python3 -B ../gallery/make.py --check --list "$1" "${@:2}"; }
 
 check_gallery() {
     checked 'docs/gallery.md and its pictures are what gallery/list.toml says' gallery ../gallery/list.toml
@@ -189,6 +189,8 @@ check_gallery() {
     refused 'the look at the gallery' 'is not what the list gives' gallery "$work/list.toml"
     sed 's/^text = /test = /' ../gallery/list.toml >"$work/list.toml"
     refused 'the look at the gallery' 'text is missing' gallery "$work/list.toml"
+    sed 's/RENDERER_VERSION: u32 = /&9/' ../contract/src/job.rs >"$work/job.rs"
+    refused 'the look at the gallery' 'was drawn by renderer version' gallery ../gallery/list.toml --job "$work/job.rs"
 }
 
 check/install.sh

@@ -18,12 +18,11 @@ def digest(file: Path) -> str:
     return hashlib.sha256(file.read_bytes()).hexdigest()
 
 
-def renderer_version(root: Path) -> int:
-    """The version of the renderer in this checkout."""
-    source = (root / "contract/src/job.rs").read_text()
-    found = re.search(r"RENDERER_VERSION: u32 = (\d+);", source)
+def renderer_version(source: Path) -> int:
+    """The version of the renderer that a file of its source names."""
+    found = re.search(r"RENDERER_VERSION: u32 = (\d+);", source.read_text())
     if found is None:
-        raise Faulty("contract/src/job.rs names no RENDERER_VERSION")
+        raise Faulty(f"{source} names no RENDERER_VERSION")
     return int(found[1])
 
 
@@ -47,8 +46,8 @@ class Drawn:
         text = json.dumps([self.asked(entry), renderer], sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:12]
 
-    def faults(self, entry: Entry) -> list[str]:
-        """Why an entry's files are not what its command makes."""
+    def faults(self, entry: Entry, renderer: int) -> list[str]:
+        """Why an entry's files are not what its command makes with this version of the renderer."""
         held = self.record.get(entry.name)
         if held is None:
             return [f"{entry.name} has not been drawn"]
@@ -57,6 +56,8 @@ class Drawn:
             return [f"{entry.name} was drawn by another command: {held['command']}"]
         if held["inputs"] != asked["inputs"]:
             return [f"{entry.name} was drawn with other key frames than {entry.key_frames} has now"]
+        if held["renderer"] != renderer:
+            return [f"{entry.name} was drawn by renderer version {held['renderer']}, not {renderer}: make gallery"]
         found = []
         for name in entry.files:
             file = self.folder / name
@@ -68,7 +69,7 @@ class Drawn:
 
     def is_current(self, entry: Entry, renderer: int) -> bool:
         """Is there nothing to draw?"""
-        return not self.faults(entry) and self.record[entry.name]["renderer"] == renderer
+        return not self.faults(entry, renderer)
 
     def note(self, entry: Entry, renderer: int) -> None:
         """Takes in that an entry's files have just been drawn."""

@@ -31,15 +31,18 @@ def words() -> argparse.Namespace:
     parser.add_argument("--page", action="store_true", help="write docs/gallery.md, draw nothing")
     parser.add_argument("--check", action="store_true", help="check docs/gallery.md and docs/gallery, draw nothing")
     parser.add_argument("--list", type=Path, default=ROOT / "gallery/list.toml", help="the list that --check goes by")
+    parser.add_argument("--job", type=Path, default=ROOT / "contract/src/job.rs", help="names the renderer's version")
     parser.add_argument("--work", type=Path, default=CACHE / "gallery", help="keeps data and pictures as drawn")
     asked = parser.parse_args()
     if not asked.check and asked.list != parser.get_default("list"):
         parser.error("another --list than the repository's is only checked, never drawn")
+    if not asked.check and asked.job != parser.get_default("job"):
+        parser.error("by another --job than the repository's is only checked, never drawn")
     return asked
 
 
-def check(gallery: Gallery, docs: Path) -> list[str]:
-    """What is not as the list says."""
+def check(gallery: Gallery, docs: Path, renderer: int) -> list[str]:
+    """What is not as the list says, or as this version of the renderer draws it."""
     written = docs / "gallery.md"
     found = []
     if not written.exists() or written.read_text() != page(gallery):
@@ -47,7 +50,7 @@ def check(gallery: Gallery, docs: Path) -> list[str]:
     drawn = Drawn(docs / "gallery", ROOT)
     for entry in gallery.entries:
         if entry.kept:
-            found += drawn.faults(entry)
+            found += drawn.faults(entry, renderer)
     named = {name for entry in gallery.entries if entry.kept for name in entry.files} | {drawn.file.name}
     there = drawn.folder.iterdir() if drawn.folder.is_dir() else ()
     found += [f"the list does not name {file.name}" for file in there if file.name not in named]
@@ -80,7 +83,7 @@ def to_draw(gallery: Gallery, asked: argparse.Namespace, drawn: dict[bool, Drawn
         raise Faulty(f"the list has no {', '.join(sorted(unknown))}")
     if asked.names:
         return [entry for entry in gallery.entries if entry.name in asked.names]
-    renderer = renderer_version(ROOT)
+    renderer = renderer_version(asked.job)
     return [e for e in gallery.entries if asked.all or not drawn[e.kept].is_current(e, renderer)]
 
 
@@ -95,7 +98,7 @@ def draw(gallery: Gallery, entries: list[Entry], asked: argparse.Namespace, draw
     anew, work = asked.all or asked.names, asked.work
     sources = Sources(program, work, cache, say)
     artist = Artist(program, sources.data, work / "pictures", ROOT, say)
-    renderer = renderer_version(ROOT)
+    renderer = renderer_version(asked.job)
     absent = sources.land_all([data for data in gallery.data if any(data in entry.data for entry in entries)])
     failed = []
     for number, entry in enumerate(entries, start=1):
@@ -135,7 +138,7 @@ def make(gallery: Gallery, asked: argparse.Namespace, docs: Path) -> int:
     if failed:
         say(f"FAILED: {', '.join(failed)}; the others are there, and `make gallery` goes on with these")
         return 1
-    return complain(check(gallery, docs))
+    return complain(check(gallery, docs, renderer_version(asked.job)))
 
 
 def complain(faults: list[str]) -> int:
@@ -151,7 +154,9 @@ def main() -> int:
     docs = ROOT / "docs"
     try:
         gallery = read(asked.list)
-        return complain(check(gallery, docs)) if asked.check else make(gallery, asked, docs)
+        if asked.check:
+            return complain(check(gallery, docs, renderer_version(asked.job)))
+        return make(gallery, asked, docs)
     except Faulty as fault:
         say(str(fault))
         return 2

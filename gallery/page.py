@@ -7,7 +7,7 @@ from entries import Data, Entry, Gallery
 HEAD = """# Gallery
 
 Written by `make gallery` from [gallery/list.toml](../gallery/list.toml): pictures and films of real data, each with the
-command that drew it. `make gallery` fetches and lands the data, draws what is missing or whose command changed
+command that drew it. `make gallery` fetches and lands the data, draws what is missing, or whose command or renderer changed
 (everything with `make gallery ARGS=--all`, one with `ARGS=NAME`) and says what it does; it needs nothing but what
 `make demo` needs. To draw one by hand, in the root of the repository:
 
