@@ -114,6 +114,29 @@ fn light_keeps_its_mass_from_a_hundred_thousand_particles_to_tens_of_millions() 
     }
 }
 
+/// A camera that has the whole disc in view hides nothing but by the horizon.
+#[test]
+fn particles_behind_the_horizon_cast_their_shadow_on_those_before_it() {
+    let scene = ocean(ONE_DEGREE);
+    let drawn = drawn(globe(-150.0, 0.0, 3.0e7, 96), &scene);
+    let casting = drawn.splats.iter().filter(|splat| splat.light_depth > 0.0);
+    let (shown, hidden): (Vec<Splat>, Vec<Splat>) = casting.partition(|splat| splat.tau > 0.0);
+    let light_of = |splats: &[Splat]| {
+        let mut light = vec![0u32; texel_count(&drawn.params)];
+        light::cpu::deposit(&drawn.params, splats, &mut light);
+        light
+    };
+    let texels = light_of(&shown).into_iter().zip(light_of(&hidden));
+    let both = texels.filter(|&(shown, hidden)| shown > 0 && hidden > 0);
+    let both = both.count();
+    println!(
+        "{} particles shown, {} behind the horizon; texels of the light with both: {both}",
+        shown.len(),
+        hidden.len()
+    );
+    assert!(hidden.len() > shown.len() / 100 && both > 20);
+}
+
 #[test]
 fn the_light_buffer_holds_the_depth_of_every_particle_to_the_last_integer() {
     let scene = ocean(ONE_DEGREE);
