@@ -468,19 +468,48 @@ pub(crate) enum Generate {
         /// Share of the full size along each side, 0.01 to 1.
         #[arg(long, default_value_t = 1.0)]
         scale: f64,
-        /// Another seed makes other weather.
-        #[arg(long, default_value_t = 1)]
-        seed: u64,
-        /// So many days from the start of 2009, 1 to 365, instead of its months.
-        #[arg(long, value_parser = clap::value_parser!(u16).range(1..=365))]
-        days: Option<u16>,
-        /// So many years of days from 2009 on, 1 to 92, a file a year: `--output` with the year before its ending.
-        #[arg(long, value_parser = clap::value_parser!(u16).range(1..=92), conflicts_with = "days")]
-        years: Option<u16>,
+        #[command(flatten)]
+        file: GeneratedFile,
         /// File to write.
         #[arg(short, long, default_value = "china-sea-synthetic.h5")]
         output: PathBuf,
     },
+    /// Synthetic CO2 flux of the whole sea between its real coasts, by months or days of 2009 or by days of many years, HDF5.
+    ///
+    /// 0.25 degrees are 720 x 1440 cells, 1/12 degree 2160 x 4320. Memory does not grow with either; a day of 0.25 degrees is some 2 MB.
+    Globe {
+        /// Side of a cell, degrees, 0.01 to 5, as a number or a fraction: 0.25, 1/12.
+        #[arg(long, default_value = "0.25", value_parser = degrees, value_name = "DEGREES")]
+        degrees: f64,
+        #[command(flatten)]
+        file: GeneratedFile,
+        /// File to write.
+        #[arg(short, long, default_value = "globe-synthetic.h5")]
+        output: PathBuf,
+    },
+}
+
+/// What any generated file is asked for.
+#[derive(Debug, Clone, Copy, Args)]
+pub(crate) struct GeneratedFile {
+    /// Another seed makes other weather.
+    #[arg(long, default_value_t = 1)]
+    pub(crate) seed: u64,
+    /// So many days from the start of 2009, 1 to 365, instead of its months.
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=365))]
+    pub(crate) days: Option<u16>,
+    /// So many years of days from 2009 on, 1 to 92, a file a year: `--output` with the year before its ending.
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=92), conflicts_with = "days")]
+    pub(crate) years: Option<u16>,
+}
+
+fn degrees(text: &str) -> Result<f64, String> {
+    let bad = || format!("{text:?} is not a number or a fraction, such as 0.25 or 1/12");
+    let number = |text: &str| text.trim().parse::<f64>().map_err(|_number| bad());
+    match text.split_once('/') {
+        Some((above, below)) => Ok(number(above)? / number(below)?),
+        None => number(text),
+    }
 }
 
 fn size(text: &str) -> Result<(u32, u32), String> {

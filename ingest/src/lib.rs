@@ -36,7 +36,7 @@ mod survey;
 pub use commit::landing_note::LandingNotes;
 pub use error::{IngestError, Rejection};
 pub use fetch::{AllowedHost, RetryLimits, Sources};
-pub use generate::{GeneratedSteps, generate_china_sea};
+pub use generate::{GeneratedSteps, generate_china_sea, generate_globe};
 pub use ingestd::{IngestService, ServiceSettings};
 pub use inspect::reader;
 pub use limits::Limits;

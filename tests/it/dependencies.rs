@@ -10,7 +10,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("contract", &[]),
     ("legend", &["contract"]),
     ("retry", &[]),
-    ("china-sea", &[]),
+    ("synthetic", &[]),
     ("service", &["retry"]),
     ("storage", &["contract", "retry"]),
     ("cube", &["contract", "storage"]),
@@ -27,7 +27,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "cube",
             "netcdf4",
             "service",
-            "china-sea",
+            "synthetic",
         ],
     ),
     (
@@ -41,7 +41,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "contract", "legend", "retry", "storage", "service", "render",
         ],
     ),
-    ("render-proof", &["contract", "render", "china-sea"]),
+    ("render-proof", &["contract", "render", "synthetic"]),
     (
         "tile-server",
         &["contract", "legend", "retry", "storage", "cube", "service"],

@@ -3,37 +3,58 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Result, ensure};
-use ingest::GeneratedSteps;
+use ingest::{GeneratedSteps, IngestError};
 
-use crate::cli::Generate;
+use crate::cli::{Generate, GeneratedFile};
 use crate::progress;
 
 /// The first year that is made up.
 const FIRST_YEAR: u16 = 2009;
 
 pub(crate) fn run(options: Generate) -> Result<()> {
-    let Generate::ChinaSea {
-        scale,
-        seed,
-        days,
-        years,
-        output,
-    } = options;
-    ensure!(
-        (0.01..=1.0).contains(&scale),
-        "--scale {scale}: give 0.01 to 1"
-    );
-    if let Some(count) = years {
-        for year in FIRST_YEAR..FIRST_YEAR + count {
-            let own = of_year(&output, year);
-            china_sea(&own, scale, seed, GeneratedSteps::Year(year))?;
-            progress::result(&own.display().to_string())?;
+    match options {
+        Generate::ChinaSea {
+            scale,
+            file,
+            output,
+        } => {
+            ensure!(
+                (0.01..=1.0).contains(&scale),
+                "--scale {scale}: give 0.01 to 1"
+            );
+            files(file, &output, |own, steps| {
+                china_sea(own, scale, file.seed, steps)
+            })
         }
-        return Ok(());
+        Generate::Globe {
+            degrees,
+            file,
+            output,
+        } => files(file, &output, |own, steps| {
+            globe(own, degrees, file.seed, steps)
+        }),
     }
-    let steps = days.map_or(GeneratedSteps::Months, GeneratedSteps::Days);
-    china_sea(&output, scale, seed, steps)?;
-    progress::result(&output.display().to_string())
+}
+
+/// Writes the file that is asked for, or one a year, and prints their names.
+fn files(
+    asked: GeneratedFile,
+    output: &Path,
+    write: impl Fn(&Path, GeneratedSteps) -> Result<()>,
+) -> Result<()> {
+    let Some(count) = asked.years else {
+        let steps = asked
+            .days
+            .map_or(GeneratedSteps::Months, GeneratedSteps::Days);
+        write(output, steps)?;
+        return progress::result(&output.display().to_string());
+    };
+    for year in FIRST_YEAR..FIRST_YEAR + count {
+        let own = of_year(output, year);
+        write(&own, GeneratedSteps::Year(year))?;
+        progress::result(&own.display().to_string())?;
+    }
+    Ok(())
 }
 
 /// `china-sea.h5` and 2010 make `china-sea-2010.h5`.
@@ -48,8 +69,25 @@ fn of_year(output: &Path, year: u16) -> PathBuf {
 
 /// Writes the synthetic China Sea with a progress bar.
 pub(crate) fn china_sea(output: &Path, scale: f64, seed: u64, steps: GeneratedSteps) -> Result<()> {
-    let bar = progress::bar("generate China Sea", 12);
-    ingest::generate_china_sea(output, scale, seed, steps, &|done, all| {
+    with_bar("generate China Sea", output, |told| {
+        ingest::generate_china_sea(output, scale, seed, steps, told)
+    })
+}
+
+/// Writes the synthetic globe with a progress bar.
+fn globe(output: &Path, degrees: f64, seed: u64, steps: GeneratedSteps) -> Result<()> {
+    with_bar("generate globe", output, |told| {
+        ingest::generate_globe(output, degrees, seed, steps, told)
+    })
+}
+
+fn with_bar(
+    what: &'static str,
+    output: &Path,
+    generate: impl Fn(&dyn Fn(usize, usize)) -> Result<(), IngestError>,
+) -> Result<()> {
+    let bar = progress::bar(what, 1);
+    generate(&|done, all| {
         bar.set_length(all as u64);
         bar.set_position(done as u64);
     })?;

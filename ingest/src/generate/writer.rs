@@ -1,12 +1,14 @@
 //! The synthetic product as an HDF5 file that the netCDF library opens: dimension scales, CF attributes, no time stamps.
 
+use std::ops::Range;
 use std::path::Path;
 
 use hdf5::{Dataset, File, SliceOrIndex};
 use ndarray::ArrayView2;
 use netcdf4::{attach, create, scale, texts};
 
-use super::{FILL, MONTHS, Shape, YEAR};
+use super::grid::FileGrid;
+use super::product::{FILL, Texts};
 
 /// Cells of a chunk: a map at scale 1 is 12 x 6 of them.
 const CHUNK_ROWS: usize = 205;
@@ -22,56 +24,76 @@ struct Axes {
     side: Dataset,
 }
 
+/// Cells that are made and written at once, at most, but for a row of chunks: 32 MB.
+const BAND_CELLS: usize = 1 << 23;
+
 /// Writes the file; the title ends with `years`, `edges_days` are days since the start of 2009 at which steps begin and the last one ends, `values`
-/// gives those of a step, `[row, col]` from the south.
+/// gives those of some rows of a step, `[row, col]` from the south.
 pub(super) fn write(
     path: &Path,
-    shape: Shape,
-    (seed, years): (u64, &str),
+    grid: FileGrid,
+    (own, years): (Texts, &str),
     edges_days: &[f64],
-    mut values: impl FnMut(usize) -> Vec<f32>,
+    mut values: impl FnMut(usize, Range<u32>) -> Vec<f32>,
 ) -> hdf5::Result<()> {
     let file = create(path)?;
-    let generator = format!("fluxglobe china-sea, seed {seed}");
-    let title = format!(
-        "SYNTHETIC China Sea air-sea CO2 flux{years}: made up by a program, no measurement"
-    );
+    let Texts { sea, command, seed } = own;
+    let generator = format!("fluxglobe {command}, seed {seed}");
+    let source = format!("fluxglobe generate {command}");
+    let title =
+        format!("SYNTHETIC {sea} air-sea CO2 flux{years}: made up by a program, no measurement");
     texts(
         &file,
         &[
             ("Conventions", "CF-1.8"),
             ("title", &title),
-            ("source", "fluxglobe generate china-sea"),
+            ("source", &source),
             ("generator", &generator),
         ],
     )?;
     file.new_attr::<i32>()
         .create("synthetic")?
         .write_scalar(&1)?;
-    let axes = write_axes(&file, shape, edges_days)?;
+    let axes = write_axes(&file, grid, edges_days)?;
     let step_count = edges_days.len() - 1;
-    let flux = create_flux(&file, shape, step_count, &axes)?;
-    let (rows, cols) = (shape.rows as usize, shape.cols as usize);
-    let all = |count| SliceOrIndex::SliceCount {
-        start: 0,
-        step: 1,
-        count,
-        block: 1,
-    };
-    for index in 0..step_count {
-        let values = values(index);
-        let map = ArrayView2::from_shape((rows, cols), &values)?;
-        let selection =
-            hdf5::Hyperslab::from(vec![SliceOrIndex::Index(index), all(rows), all(cols)]);
-        flux.write_slice(map, selection)?;
+    let flux = create_flux(&file, grid, step_count, &axes)?;
+    for step in 0..step_count {
+        for rows in bands(grid) {
+            write_rows(&flux, step, rows.clone(), &values(step, rows))?;
+        }
     }
     file.close()
 }
 
-fn write_axes(file: &File, shape: Shape, days: &[f64]) -> hdf5::Result<Axes> {
+/// Rows that are written together: whole rows of chunks.
+fn bands(grid: FileGrid) -> impl Iterator<Item = Range<u32>> {
+    let chunk_cells = CHUNK_ROWS * grid.cols as usize;
+    let rows = (BAND_CELLS / chunk_cells).max(1) * CHUNK_ROWS;
+    let band = move |first: u32| first..(first + rows as u32).min(grid.rows);
+    (0..grid.rows).step_by(rows).map(band)
+}
+
+fn write_rows(flux: &Dataset, step: usize, rows: Range<u32>, values: &[f32]) -> hdf5::Result<()> {
+    let count = rows.len();
+    let map = ArrayView2::from_shape((count, values.len() / count), values)?;
+    let from = |start: u32, count: usize| SliceOrIndex::SliceCount {
+        start: start as usize,
+        step: 1,
+        count,
+        block: 1,
+    };
+    let selection = hdf5::Hyperslab::from(vec![
+        SliceOrIndex::Index(step),
+        from(rows.start, count),
+        from(0, map.ncols()),
+    ]);
+    flux.write_slice(map, selection)
+}
+
+fn write_axes(file: &File, grid: FileGrid, days: &[f64]) -> hdf5::Result<Axes> {
     let middles: Vec<f64> = days.windows(2).map(|d| f64::midpoint(d[0], d[1])).collect();
-    let lats: Vec<f64> = (0..shape.rows).map(|r| shape.lat_deg(r)).collect();
-    let lons: Vec<f64> = (0..shape.cols).map(|c| shape.lon_deg(c)).collect();
+    let lats: Vec<f64> = (0..grid.rows).map(|r| grid.lat_deg(r)).collect();
+    let lons: Vec<f64> = (0..grid.cols).map(|c| grid.lon_deg(c)).collect();
     let time = scale(file, "time", &middles)?;
     let units = ("units", "days since 2009-01-01");
     texts(
@@ -112,8 +134,13 @@ fn write_axes(file: &File, shape: Shape, days: &[f64]) -> hdf5::Result<Axes> {
     Ok(axes)
 }
 
-fn create_flux(file: &File, shape: Shape, step_count: usize, axes: &Axes) -> hdf5::Result<Dataset> {
-    let (rows, cols) = (shape.rows as usize, shape.cols as usize);
+fn create_flux(
+    file: &File,
+    grid: FileGrid,
+    step_count: usize,
+    axes: &Axes,
+) -> hdf5::Result<Dataset> {
+    let (rows, cols) = (grid.rows as usize, grid.cols as usize);
     let flux = file
         .new_dataset::<f32>()
         .obj_track_times(false)
@@ -141,16 +168,4 @@ fn create_flux(file: &File, shape: Shape, step_count: usize, axes: &Axes) -> hdf
         .write_scalar(&FILL)?;
     attach(file, &flux, &[&axes.time, &axes.lat, &axes.lon])?;
     Ok(flux)
-}
-
-/// Days from the start of 2009 to the start of a month, 0 for that January, 12 for the one after.
-pub(super) fn first_day(month: usize) -> f64 {
-    let start = |month: usize| {
-        let year = i32::from(YEAR) + (month / MONTHS) as i32;
-        let start = contract::time::TimeMs::from_ymd(year, (month % MONTHS) as u32 + 1, 1);
-        start.map(|t| t.ms() as f64 / 86_400_000.0)
-    };
-    start(month)
-        .and_then(|day| Ok(day - start(0)?))
-        .expect("months of 2009 and later exist")
 }

@@ -9,7 +9,6 @@ use std::sync::Arc;
 use std::thread;
 
 use anyhow::Result;
-use china_sea::{Noise, coast, flux};
 use contract::camera::CameraAngles;
 use contract::colour::TransferFunction;
 use contract::grid::{Grid, LonLatDeg};
@@ -18,6 +17,8 @@ use contract::look_at::LookAt;
 use contract::quantity::Quantity;
 use contract::time_sample::TimeSample;
 use render::{Field, Interval, Scene};
+use synthetic::Noise;
+use synthetic::china_sea::{coast, flux};
 
 const NORTH_DEG: f64 = 41.0;
 const WEST_DEG: f64 = 100.0;

@@ -5,7 +5,7 @@ use std::sync::LazyLock;
 use super::Profile;
 
 /// Name and text of each, in the order in which they are tried.
-const TEXTS: [(&str, &str); 32] = [
+const TEXTS: [(&str, &str); 33] = [
     (
         "takahashi09-flux",
         include_str!("../../../profiles/takahashi09-flux.toml"),
@@ -63,6 +63,10 @@ const TEXTS: [(&str, &str); 32] = [
     (
         "china-sea-synthetic",
         include_str!("../../../profiles/china-sea-synthetic.toml"),
+    ),
+    (
+        "globe-synthetic",
+        include_str!("../../../profiles/globe-synthetic.toml"),
     ),
     (
         "globcurrent-east",
