@@ -1,21 +1,21 @@
 //! Instants and the periods that product steps cover: UTC, milliseconds, ISO 8601 at the edge.
 
+mod text;
 mod words;
 
 use std::fmt::{Display, Formatter};
 use std::str::FromStr;
 
-use chrono::{DateTime, Datelike as _, Months, NaiveDate, NaiveDateTime, SecondsFormat, Utc};
-use serde::{Deserialize, Serialize};
+use chrono::{DateTime, Datelike as _, Months, NaiveDate, NaiveDateTime, Utc};
+use serde::{Deserialize, Serialize, Serializer};
 use utoipa::ToSchema;
 
 use crate::ContractError;
+use text::IsoText;
 
 /// An instant, milliseconds since 1970-01-01T00:00:00Z; shown and parsed as ISO 8601.
-#[derive(
-    Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, ToSchema,
-)]
-#[serde(try_from = "String", into = "String")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Deserialize, ToSchema)]
+#[serde(try_from = "String")]
 #[schema(value_type = String, format = DateTime, description = "An instant, ISO 8601 UTC.")]
 pub struct TimeMs(i64);
 
@@ -80,7 +80,13 @@ fn bad_time(text: &str) -> ContractError {
 
 impl Display for TimeMs {
     fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
-        f.write_str(&self.utc().to_rfc3339_opts(SecondsFormat::AutoSi, true))
+        f.write_str(IsoText::of(self.utc()).as_str())
+    }
+}
+
+impl Serialize for TimeMs {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(IsoText::of(self.utc()).as_str())
     }
 }
 

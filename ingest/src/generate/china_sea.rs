@@ -92,10 +92,6 @@ impl MadeUp for ChinaSea {
 }
 
 #[cfg(test)]
-#[expect(
-    clippy::float_cmp,
-    reason = "the fill value is written as it is compared"
-)]
 mod tests {
     use super::*;
 

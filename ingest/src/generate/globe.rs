@@ -104,10 +104,6 @@ impl MadeUp for Globe {
 }
 
 #[cfg(test)]
-#[expect(
-    clippy::float_cmp,
-    reason = "the fill value is written as it is compared"
-)]
 mod tests {
     use super::*;
 

@@ -22,7 +22,7 @@ use product::{KeptMonth, MadeUp};
 pub use steps::GeneratedSteps;
 
 /// Is told of steps done, and of steps in all.
-pub type Progress<'a> = &'a dyn Fn(usize, usize);
+type Progress<'a> = &'a dyn Fn(usize, usize);
 
 /// Writes the synthetic China Sea product. `scale` is 1 for 1800 x 2460 cells, 0.1 for 180 x 246.
 pub fn generate_china_sea(

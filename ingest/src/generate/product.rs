@@ -67,10 +67,6 @@ impl KeptMonth {
     }
 }
 
-#[expect(
-    clippy::float_cmp,
-    reason = "the fill value is written as it is compared"
-)]
 fn stronger(value: f32, strength: f32) -> f32 {
     if value == FILL {
         FILL
