@@ -147,6 +147,7 @@ impl Analyse for Analyst {
     async fn statistics(
         &self,
         manifest: &Manifest,
+        id: &ManifestId,
         query: &StatisticsQuery,
     ) -> Result<StatisticsAnswer, BackendError> {
         // A place is a few blocks: asking a cluster would take longer than reading them.
@@ -154,7 +155,7 @@ impl Analyse for Analyst {
             Geometry::Point { .. } => &self.local,
             Geometry::Line(_) | Geometry::Region(_) => &self.regions,
         };
-        let answer = compute::reduce::statistics_of(engine, query, manifest);
+        let answer = compute::reduce::statistics_of(engine, query, manifest, id.clone());
         answer.await.map_err(compute_failed)
     }
 

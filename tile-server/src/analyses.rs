@@ -192,7 +192,8 @@ impl Analyses {
             query.ocean.as_ref().map(|ocean| ocean.id()),
         ));
         let (analyst, manifest) = (Arc::clone(&self.analyst), Arc::clone(&layer.manifest));
-        let computed = async move { analyst.statistics(&manifest, &query).await };
+        let id = layer.id.clone();
+        let computed = async move { analyst.statistics(&manifest, &id, &query).await };
         self.statistics
             .answer(key, &self.gate, &self.metrics, computed)
             .await

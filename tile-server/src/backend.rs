@@ -162,6 +162,7 @@ pub trait Analyse: Send + Sync + 'static {
     async fn statistics(
         &self,
         manifest: &Manifest,
+        id: &ManifestId,
         query: &StatisticsQuery,
     ) -> Result<StatisticsAnswer, BackendError>;
     /// What is made of series of versions of products.

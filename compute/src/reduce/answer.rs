@@ -28,21 +28,21 @@ pub async fn statistics(
     query: &StatisticsQuery,
 ) -> Result<StatisticsAnswer, ComputeError> {
     let manifest = catalogue::product(engine.store(), &query.product).await?;
-    statistics_of(engine, query, &manifest).await
+    statistics_of(engine, query, &manifest, manifest.id()).await
 }
 
-/// The same of one version.
+/// The same of one version; `id` is its name, which is costly to compute.
 pub async fn statistics_of(
     engine: &Engine,
     query: &StatisticsQuery,
     manifest: &Manifest,
+    id: ManifestId,
 ) -> Result<StatisticsAnswer, ComputeError> {
     let (window, inside) = manifest.steps_inside(query.from, query.to)?;
     let periods: Vec<Period> = manifest.steps.iter().map(|step| step.period).collect();
     let bins = query.step.bins(window, periods.iter().copied())?;
     let weighed = Weighed::of(engine, manifest, query).await?;
     let first = periods.partition_point(|period| period.end <= window.start);
-    let id = manifest.id();
     let mut asked = Asked {
         engine,
         manifest,

@@ -333,6 +333,7 @@ impl Analyse for Analyst {
     async fn statistics(
         &self,
         manifest: &Manifest,
+        id: &ManifestId,
         query: &StatisticsQuery,
     ) -> Result<StatisticsAnswer, BackendError> {
         self.mood().apply()?;
@@ -346,7 +347,7 @@ impl Analyse for Analyst {
         let names = query.statistics.iter().map(|one| one.to_string());
         Ok(StatisticsAnswer {
             product: manifest.product.clone(),
-            manifest: manifest.id(),
+            manifest: id.clone(),
             title: manifest.title.clone(),
             source: manifest.source.clone(),
             synthetic: manifest.synthetic,
