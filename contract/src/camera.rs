@@ -115,7 +115,7 @@ impl CameraAngles {
     }
 
     /// The largest tilt with anything of the earth and what is above it in the picture, degrees.
-    fn most_tilt_deg(&self, height_m: f64, size_px: [u32; 2]) -> f64 {
+    pub fn most_tilt_deg(&self, height_m: f64, size_px: [u32; 2]) -> f64 {
         if height_m <= HIGHEST_PARTICLE_M {
             return 180.0;
         }

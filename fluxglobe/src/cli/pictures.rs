@@ -55,7 +55,10 @@ pub(crate) struct RenderAnimation {
     )]
     pub(crate) orbit: Option<f64>,
     /// Way of the camera: a JSON list of `{"seconds", "look_at": [LON, LAT], "distance_km", "heading", "tilt", "roll",
-    /// "fov", "easing": "in-out" or "linear"}`; the first is at 0 seconds.
+    /// "fov", "easing"}`, the first at 0 seconds; `"camera": [LON, LAT], "height_km"` in the place of `look_at` and
+    /// `distance_km` say where the camera itself stands, with its own heading and tilt. The easing says how it goes on to the
+    /// next: "through" (flies on without a halt; so unless another is named), "in-out" (starts and ends at rest) or
+    /// "linear" (goes evenly).
     #[arg(
         long,
         value_name = "FILE.json",

@@ -8,6 +8,8 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
 use contract::annotation::{Annotations, Graticule};
+use contract::base_map::{Background, BaseMap};
+use contract::context::Context;
 use contract::digest::Digest;
 use contract::isolines::Isolines;
 use contract::job::{Mode, RENDERER_VERSION, RenderJob, View};
@@ -242,6 +244,65 @@ fn wide_maps_match_their_golden_picture() {
     let mut job = job(Mode::Map, wide(view));
     job.style.context.coastlines = true;
     matches_golden_of("map_wide", &ocean(ONE_DEGREE), job);
+}
+
+#[test]
+fn wide_volumes_on_the_light_base_map_match_their_golden_picture() {
+    let view = looking_at([-112.0, 8.0], 6.0e6, [30.0, 45.0], 0);
+    let mut job = job(Mode::Volume, wide(view));
+    job.style.height_m_per_kg_m2 = 1e7;
+    job.style.context = Context {
+        coastlines: true,
+        borders: true,
+        sea_floor: true,
+        base_map: BaseMap::Light,
+        background: Background::Sky,
+        ..job.style.context
+    };
+    matches_golden_of("light_wide", &ocean(ONE_DEGREE), job);
+}
+
+#[test]
+fn wide_trails_over_a_volume_match_their_golden_picture() {
+    let view = looking_at([-35.0, 30.0], 6.0e6, [20.0, 45.0], 0);
+    let mut job = job(Mode::Volume, wide(view));
+    job.style.context.coastlines = true;
+    let (scene, job) = with_trails(job);
+    matches_golden_of("trails_wide", &scene, job);
+}
+
+#[test]
+fn wide_flows_match_their_golden_picture() {
+    let view = looking_at([-140.0, 25.0], 7.0e6, [0.0, 35.0], 0);
+    let mut job = currents::job(wide(view), 1e7);
+    job.style.context.coastlines = true;
+    matches_golden_of("flow_wide", &gyres(ONE_DEGREE), job);
+}
+
+#[test]
+fn wide_isolines_match_their_golden_picture() {
+    let view = looking_at([-140.0, 15.0], 7.0e6, [10.0, 40.0], 0);
+    let mut job = job(Mode::Map, wide(view));
+    job.style.context.coastlines = true;
+    job.style.context.isolines = Some(Isolines::Every {
+        zero: 0.0,
+        step: 10.0 * GRAM_A_YEAR,
+    });
+    job.annotations = Some(Annotations {
+        graticule: Graticule::every(15.0).ok(),
+        ..Annotations::none()
+    });
+    matches_golden_of("isolines_wide", &ocean(ONE_DEGREE), job);
+}
+
+#[test]
+fn wide_seas_without_data_match_their_golden_picture() {
+    // The made-up data end at 80 degrees north, and leave out seas where there is made-up land.
+    let view = looking_at([-20.0, 80.0], 5.0e6, [-20.0, 25.0], 0);
+    let mut job = job(Mode::Map, wide(view));
+    job.style.context.coastlines = true;
+    job.style.context.sea_floor = true;
+    matches_golden_of("hatch_wide", &ocean(ONE_DEGREE), job);
 }
 
 #[test]

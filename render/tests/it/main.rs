@@ -19,6 +19,7 @@ mod ground;
 mod hot;
 mod isolines;
 mod layout;
+mod legible;
 mod light_of_parts;
 mod limits;
 mod look;

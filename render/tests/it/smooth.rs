@@ -1,5 +1,7 @@
 //! No popping: what moves a little changes the picture a little, and half as far changes it about half as much.
 
+mod levels;
+
 use contract::job::{Mode, RenderJob, View};
 use render::plan::Plan;
 use render::{Backend, Image, Renderer, Scene};
