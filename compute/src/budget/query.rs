@@ -91,12 +91,8 @@ async fn of_flux(
     };
     let mut basis = None;
     if let Some(errors) = &query.errors {
-        let periods = rows.iter().map(|row| Period {
-            start: row.start,
-            end: row.end,
-        });
-        let (periods, flux): (Vec<_>, _) = (periods.collect(), (manifest, steps));
-        let uncertain = uncertainty::of_rows(engine, query, errors, flux, &periods).await?;
+        let flux = (manifest, steps);
+        let uncertain = uncertainty::of_rows(engine, query, errors, flux, &rows).await?;
         for (row, own) in rows.iter_mut().zip(uncertain.rows) {
             row.uncertainty = Some(own);
         }

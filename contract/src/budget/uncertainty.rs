@@ -12,13 +12,13 @@ use crate::manifest::{Manifest, ManifestId};
 use crate::product::ProductId;
 
 /// Longest correlation length, km: beyond, everything goes together as it is.
-pub const MAX_LENGTH_KM: f64 = 1e6;
+const MAX_LENGTH_KM: f64 = 1e6;
 /// Longest correlation time, days.
-pub const MAX_DAYS: f64 = 1e6;
+const MAX_DAYS: f64 = 1e6;
 /// Most draws of a Monte Carlo.
-pub const MAX_DRAWS: u32 = 10_000;
+const MAX_DRAWS: u32 = 10_000;
 /// Fewest: below, the spread of the draws says little.
-pub const MIN_DRAWS: u32 = 10;
+const MIN_DRAWS: u32 = 10;
 
 /// Standard error of a flux as somebody states it: `20%`, `0.3 mol m-2 year-1`, or the product that holds it.
 #[derive(Debug, Clone, PartialEq)]

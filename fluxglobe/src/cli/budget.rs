@@ -59,6 +59,13 @@ pub(crate) struct Budget {
     /// How long the errors of steps go together: as exp(-t / DAYS). The error of each step is its own if absent.
     #[arg(long, value_name = "DAYS", allow_negative_numbers = true, help_heading = UNCERTAINTY)]
     pub(crate) correlation_days: Option<f64>,
+    /// Draw so many fields of random errors too, 10 to 10000: a check of the sum over pairs, and an interval that holds 95 % of the
+    /// budgets.
+    #[arg(long, value_name = "DRAWS", help_heading = UNCERTAINTY)]
+    pub(crate) monte_carlo: Option<u32>,
+    /// The same seed draws the same errors, on any number of threads; 0 if absent.
+    #[arg(long, value_name = "NUMBER", help_heading = UNCERTAINTY)]
+    pub(crate) seed: Option<u64>,
     /// Outgassing of carbon that rivers bring, out of the sea, which is taken off to leave the anthropogenic part: Tg a year with
     /// its standard error if it has one, such as 650 or 650+-300, or a PRODUCT, which is summed over the same region.
     #[arg(long, value_name = "TG_PER_YEAR|PRODUCT", allow_hyphen_values = true, help_heading = PARTS)]
@@ -83,7 +90,8 @@ impl Budget {
                 error: self.error.as_deref(),
                 correlation_length_km: self.correlation_length_km,
                 correlation_days: self.correlation_days,
-                ..ErrorWords::default()
+                monte_carlo: self.monte_carlo,
+                seed: self.seed,
             },
             river_flux: self.river_flux.as_deref(),
             river_source: self.river_source.as_deref(),

@@ -19,7 +19,7 @@ use utoipa::IntoParams;
 
 use crate::catalogue::Layer;
 use crate::error::ServerError;
-use crate::extract::{UrlPath, UrlQuery, number, parsed, time};
+use crate::extract::{UrlPath, UrlQuery, number, parsed, time, whole_number};
 use crate::state::AppState;
 
 #[derive(Debug, Deserialize, IntoParams)]
@@ -58,6 +58,12 @@ pub(crate) struct BudgetParameters {
     /// How long errors of steps go together, days: exp(-t / days). 0, the error of each step is its own, unless given.
     #[param(value_type = Option<f64>, minimum = 0)]
     correlation_days: Option<String>,
+    /// Draws of a Monte Carlo, 10 to 10000: a check, and an interval that holds 95 % of the budgets.
+    #[param(value_type = Option<u32>, minimum = 10, maximum = 10000)]
+    monte_carlo: Option<String>,
+    /// The same seed draws the same errors; 0 unless given.
+    #[param(value_type = Option<u64>)]
+    seed: Option<String>,
     /// Outgassing of river carbon that is taken off, Tg of carbon a year out of the sea, with its standard error if there is one
     /// (`650` or `650±300`), or a product that is summed over the same region.
     river_flux: Option<String>,
@@ -91,23 +97,36 @@ impl BudgetParameters {
     }
 
     fn words(&self) -> Result<BudgetWords<'_>, ServerError> {
-        let at_least_0 = |what, text: Option<&str>, unit| {
+        let optional = |what, text: Option<&str>, unit| {
             text.map(|text| number(what, text, unit)).transpose()
         };
         let length = self.correlation_length_km.as_deref();
         let days = self.correlation_days.as_deref();
+        let draws = self.monte_carlo.as_deref();
         Ok(BudgetWords {
             errors: ErrorWords {
                 error: self.error.as_deref(),
-                correlation_length_km: at_least_0("correlation_length_km", length, "km")?,
-                correlation_days: at_least_0("correlation_days", days, "days")?,
-                ..ErrorWords::default()
+                correlation_length_km: optional("correlation_length_km", length, "km")?,
+                correlation_days: optional("correlation_days", days, "days")?,
+                monte_carlo: draws.map(|text| whole_number("monte_carlo", text, DRAWS)).transpose()?,
+                seed: seed(self.seed.as_deref())?,
             },
             river_flux: self.river_flux.as_deref(),
             river_source: self.river_source.as_deref(),
             regions: self.regions.as_deref(),
         })
     }
+}
+
+const DRAWS: &str = "a number of draws, 10 to 10000";
+
+fn seed(text: Option<&str>) -> Result<Option<u64>, ServerError> {
+    let read = |text: &str| {
+        let digits = !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
+        let number = if digits { text.parse().ok() } else { None };
+        number.ok_or_else(|| ServerError::invalid("seed", text, "a whole number below 2^64"))
+    };
+    text.map(read).transpose()
 }
 
 /// The carbon budget of a region: by month, by year or in all, with its coverage and what gaps would add.

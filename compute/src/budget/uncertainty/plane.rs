@@ -23,13 +23,6 @@ pub(super) struct Plane {
     pub(super) is_ring: bool,
 }
 
-impl Plane {
-    /// Number of blocks.
-    pub(super) fn len(&self) -> usize {
-        self.lats_deg.len() * self.cols
-    }
-}
-
 /// Where cells of a grid lie in a plane.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Window {
@@ -112,6 +105,14 @@ impl Window {
             cols,
             is_ring: self.is_ring,
         }
+    }
+
+    /// How many blocks go round the earth; none if that is no whole number.
+    pub(super) fn round(&self, grid: &Grid) -> Option<usize> {
+        /// Share of a block: axes of grids are rounded.
+        const SLACK: f64 = 1e-6;
+        let round = 360.0 / self.plane(grid).dlon_deg;
+        ((round - round.round()).abs() < SLACK).then_some(round.round() as usize)
     }
 
     /// Longer side of the largest block, km.

@@ -89,6 +89,61 @@ impl Scheme {
     }
 }
 
+/// Blocks of which errors are drawn for so many steps, so that it ends in time.
+///
+/// # Errors
+/// `Uncertainty` where nothing is to be drawn, or blocks would be longer than errors go together.
+pub(super) fn of_draws(
+    grid: &Grid,
+    window: &Window,
+    length_km: f64,
+    step_count: usize,
+    draws: u32,
+) -> Result<Window, ComputeError> {
+    let refused = |reason: &str| ComputeError::Uncertainty {
+        reason: format!("Monte Carlo: {reason}"),
+    };
+    if length_km <= 0.0 {
+        return Err(refused(
+            "nothing is drawn where the error of each cell is its own; the sum of squares is exact",
+        ));
+    }
+    let windows = (1..=MAX_BLOCK).filter_map(|block| window.with_blocks(block));
+    let mut windows = windows.filter(|window| window.round(grid).is_some());
+    let ends = |window: &Window| draws_cost(grid, window, step_count, draws) <= MOST_WORK_NS;
+    let found = windows.find(|window| ends(window)).ok_or_else(|| {
+        refused("too many cells, steps and draws, or a grid whose cells do not go evenly round the earth; ask for fewer")
+    })?;
+    if found.block > 1 && length_km < BLOCKS_IN_LENGTH * found.block_km(grid) {
+        return Err(refused(&format!(
+            "so many cells, steps and draws are taken in blocks of {} cells a side, {:.0} km long, and a correlation length of \
+             {length_km} km does not hold {BLOCKS_IN_LENGTH} of them; ask for fewer",
+            found.block,
+            found.block_km(grid)
+        )));
+    }
+    Ok(found)
+}
+
+/// Work of draws, ns; without end where they take too much memory.
+fn draws_cost(grid: &Grid, window: &Window, step_count: usize, draws: u32) -> f64 {
+    /// A product of a factor and a number, one of a transform with its wave, and a normal number, ns.
+    const PRODUCT_NS: f64 = 1.2;
+    const TRANSFORM_NS: f64 = 30.0;
+    const NORMAL_NS: f64 = 15.0;
+    let rows = window.size().0 as f64;
+    let round = window.round(grid).unwrap_or(usize::MAX) as f64;
+    let (waves, triangle) = (round / 2.0 + 1.0, rows * rows / 2.0);
+    if waves * triangle * size_of::<f64>() as f64 > HELD_BYTES as f64 {
+        return f64::INFINITY;
+    }
+    let setting_up = triangle * round * KERNEL_NS + waves * rows * triangle / 3.0 * PRODUCT_NS;
+    let a_step = waves * triangle * 2.0 * PRODUCT_NS
+        + rows * round * TRANSFORM_NS
+        + waves * rows * 2.0 * NORMAL_NS;
+    setting_up + f64::from(draws) * step_count as f64 * a_step
+}
+
 /// Work in ns, and forms that are summed at a time.
 fn cost(grid: &Grid, window: &Window, form_count: usize) -> (f64, usize) {
     let plane = window.plane(grid);

@@ -27,6 +27,10 @@ fn pair_by_pair(plane: &Plane, length_km: f64, form: &Form) -> f64 {
     sum
 }
 
+fn len(plane: &Plane) -> usize {
+    plane.lats_deg.len() * plane.cols
+}
+
 fn form(cells: usize, turn: f64) -> Form {
     let wave = |i: usize, turn: f64| {
         // Some cells hold nothing, as land does.
@@ -79,7 +83,7 @@ fn planes() -> [Plane; 4] {
 fn sums_are_those_of_all_pairs() {
     for plane in planes() {
         for length_km in [50.0, 700.0, 20_000.0] {
-            let forms = [form(plane.len(), 0.7), form(plane.len(), 0.11)];
+            let forms = [form(len(&plane), 0.7), form(len(&plane), 0.11)];
             let pairs = Pairs::new(plane.clone(), length_km);
             let spectra: Vec<_> = forms.iter().map(|form| pairs.spectrum(form)).collect();
             for (sum, form) in pairs.sums(&spectra).iter().zip(&forms) {
@@ -98,7 +102,7 @@ fn sums_are_those_of_all_pairs() {
 #[test]
 fn errors_that_do_not_go_together_add_by_squares_and_those_that_do_by_size() {
     for plane in planes() {
-        let own = form(plane.len(), 0.3);
+        let own = form(len(&plane), 0.3);
         let at = |length_km: f64| {
             let pairs = Pairs::new(plane.clone(), length_km);
             pairs.sums(&[pairs.spectrum(&own)])[0]
@@ -114,7 +118,7 @@ fn errors_that_do_not_go_together_add_by_squares_and_those_that_do_by_size() {
 fn any_number_of_threads_gives_the_same_bits() {
     let plane = planes()[0].clone();
     let pairs = Pairs::new(plane.clone(), 900.0);
-    let spectra = [pairs.spectrum(&form(plane.len(), 0.4))];
+    let spectra = [pairs.spectrum(&form(len(&plane), 0.4))];
     let with = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
         let pool = pool.build().unwrap();
