@@ -144,7 +144,9 @@ impl BudgetParts {
     pub fn key(&self) -> impl Serialize + use<> {
         match self {
             Self::Regions(regions) => {
-                let named = regions.iter().map(|one| (one.name.clone(), one.region.clone()));
+                let named = regions
+                    .iter()
+                    .map(|one| (one.name.clone(), one.region.clone()));
                 (Some(named.collect::<Vec<_>>()), None)
             }
             Self::Mask(mask) => (None, Some(mask.id())),

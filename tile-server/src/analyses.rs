@@ -49,7 +49,10 @@ fn numbers(answer: &StatisticsAnswer) -> u64 {
 
 /// Rows of an answer, those of its regions too.
 fn budget_rows(answer: &BudgetAnswer) -> u64 {
-    let of_regions = answer.regions.iter().map(|region| region.rows.len() as u64 + 1);
+    let of_regions = answer
+        .regions
+        .iter()
+        .map(|region| region.rows.len() as u64 + 1);
     answer.rows.len() as u64 + of_regions.sum::<u64>() + 1
 }
 

@@ -140,7 +140,8 @@ impl Catalogue {
         };
         match manifests::as_of(&self.reader.store, product_id, instant).await? {
             AtInstant::Version(manifest) => {
-                self.version(product, Some(&manifest.id().to_string())).await
+                self.version(product, Some(&manifest.id().to_string()))
+                    .await
             }
             AtInstant::BeforeFirst(first) => {
                 Err(AsOf::before_first(product_id, instant, first).into())

@@ -127,7 +127,9 @@ mod tests {
     fn parts_that_follow_each_other_sum_to_the_whole() {
         for value in [1, -1, 5, 10, -20, 1_234_567_890_123] {
             let cuts = [0, 1, 2, 5, 6, 7];
-            let parts = cuts.windows(2).map(|cut| share_between(value, cut[0], cut[1], 7).unwrap());
+            let parts = cuts
+                .windows(2)
+                .map(|cut| share_between(value, cut[0], cut[1], 7).unwrap());
             assert_eq!(parts.sum::<i128>(), value);
         }
     }

@@ -54,7 +54,9 @@ impl Reads {
         Ok(Self {
             grid: manifest.grid,
             quantity: manifest.quantity,
-            steps: steps.map(|step| (step.period, step.field.clone())).collect(),
+            steps: steps
+                .map(|step| (step.period, step.field.clone()))
+                .collect(),
         })
     }
 
@@ -96,7 +98,9 @@ impl Reads {
 pub async fn history(engine: &Engine, query: &BudgetQuery) -> Result<BudgetHistory, ComputeError> {
     if query.step != BudgetStep::Total || query.parts.is_some() {
         let reason = "a history is of one number: ask for the total of one region";
-        return Err(contract::ContractError::invalid("step", &query.step.to_string(), reason).into());
+        return Err(
+            contract::ContractError::invalid("step", &query.step.to_string(), reason).into(),
+        );
     }
     let published = manifests::published(engine.store(), &query.product).await?;
     if published.is_empty() {
@@ -105,7 +109,10 @@ pub async fn history(engine: &Engine, query: &BudgetQuery) -> Result<BudgetHisto
             known: manifests::products(engine.store()).await?,
         });
     }
-    let (version_count, skipped) = (published.len(), published.len().saturating_sub(MOST_VERSIONS));
+    let (version_count, skipped) = (
+        published.len(),
+        published.len().saturating_sub(MOST_VERSIONS),
+    );
     let mut notes = NOTES.map(str::to_owned).to_vec();
     if skipped > 0 {
         notes.push(format!("the {skipped} oldest versions were not looked at"));
@@ -127,7 +134,10 @@ pub async fn history(engine: &Engine, query: &BudgetQuery) -> Result<BudgetHisto
             return Err(contract::ContractError::invalid("history", name, reason).into());
         }
         let change = reads.change_from(before.as_ref());
-        let last = versions.iter().rev().find_map(|own: &VersionBudget| own.budget_tg);
+        let last = versions
+            .iter()
+            .rev()
+            .find_map(|own: &VersionBudget| own.budget_tg);
         versions.push(version(engine, query, (&manifest, at), change, last).await?);
         before = Some(reads);
     }

@@ -27,7 +27,9 @@ pub(super) fn of_time(rows: &[BudgetRow], total: &[BudgetRow]) -> Option<Closure
 
 /// Sum of rows, kg in steps of 10⁻⁹.
 fn mass_steps(rows: &[BudgetRow]) -> Option<i128> {
-    let mut steps = rows.iter().map(|row| steps_of_text(&row.budget_kg, MASS_DECIMALS));
+    let mut steps = rows
+        .iter()
+        .map(|row| steps_of_text(&row.budget_kg, MASS_DECIMALS));
     steps.try_fold(0i128, |sum, own| sum.checked_add(own?))
 }
 
@@ -50,7 +52,10 @@ pub(super) async fn add(
             &of_mask
         }
     };
-    let together: Vec<Polygon> = parts.iter().flat_map(|part| polygons(&part.region)).collect();
+    let together: Vec<Polygon> = parts
+        .iter()
+        .flat_map(|part| polygons(&part.region))
+        .collect();
     check_inside(query, &together)?;
     let mut budgets = vec![];
     for part in parts {
@@ -89,11 +94,13 @@ async fn budget(
         parts: None,
         ..query.clone()
     };
-    let answer = of_region(engine, &own, manifest).await.map_err(|e| match e {
-        ComputeError::Region { reason } => named(&part.name, &reason),
-        outside @ ComputeError::RegionOutside { .. } => named(&part.name, &outside.to_string()),
-        other => other,
-    })?;
+    let answer = of_region(engine, &own, manifest)
+        .await
+        .map_err(|e| match e {
+            ComputeError::Region { reason } => named(&part.name, &reason),
+            outside @ ComputeError::RegionOutside { .. } => named(&part.name, &outside.to_string()),
+            other => other,
+        })?;
     Ok(RegionBudget {
         region: answer.region,
         region_area_m2: answer.region_area_m2,
@@ -168,7 +175,10 @@ fn closure(
     let million = |m2: f64| format!("{:.6} million km²", m2 / M2_PER_MILLION_KM2);
     let summary = match (overlap_m2 > 0.0, left_out_m2 > 0.0) {
         (false, false) => "the regions fill the whole and do not overlap".to_owned(),
-        (true, false) => format!("the regions fill the whole and overlap by {}", million(overlap_m2)),
+        (true, false) => format!(
+            "the regions fill the whole and overlap by {}",
+            million(overlap_m2)
+        ),
         (false, true) => format!(
             "the regions do not overlap and leave {} of the whole out, land included",
             million(left_out_m2)

@@ -78,9 +78,8 @@ async fn of_flux(
         sea_steps: sums.sea_steps,
         cells: query.cells,
     };
-    let too_large = || {
-        ComputeError::inconsistent(manifest.id().to_string(), "its sums exceed 128 bits")
-    };
+    let too_large =
+        || ComputeError::inconsistent(manifest.id().to_string(), "its sums exceed 128 bits");
     let rows_of = |periods: &[Period]| rows(periods, &sums.steps, &asked).ok_or_else(too_large);
     let mut rows = rows_of(&row_periods(window, query.step)?)?;
     let closure = match query.step {

@@ -50,9 +50,8 @@ impl River {
     }
 
     fn of_rate(asked: &AskedRiver, rate: f64, sigma: Option<f64>, rows: &[BudgetRow]) -> Self {
-        let years = |row: &BudgetRow| {
-            (row.end.ms() - row.start.ms()) as f64 / 1000.0 / SECONDS_PER_YEAR
-        };
+        let years =
+            |row: &BudgetRow| (row.end.ms() - row.start.ms()) as f64 / 1000.0 / SECONDS_PER_YEAR;
         Self {
             basis: RiverFlux {
                 source: asked.source.clone().unwrap_or_default(),
@@ -79,11 +78,16 @@ impl River {
             });
         }
         let (Some(first), Some(last)) = (rows.first(), rows.last()) else {
-            return Err(ComputeError::inconsistent(manifest.product.as_str(), "no row"));
+            return Err(ComputeError::inconsistent(
+                manifest.product.as_str(),
+                "no row",
+            ));
         };
         for row in rows {
             if !covers(manifest, row) {
-                let covered = manifest.extent().map_or("nothing".to_owned(), |own| own.to_string());
+                let covered = manifest
+                    .extent()
+                    .map_or("nothing".to_owned(), |own| own.to_string());
                 return Err(ComputeError::Uncertainty {
                     reason: format!(
                         "the river flux {} does not cover all of {}/{}: it covers {covered}; ask for a period that both have",
@@ -104,12 +108,16 @@ impl River {
         let answer = of_region(engine, &of_rivers, manifest).await?;
         let same = |row: &BudgetRow| {
             let mut own = answer.rows.iter();
-            own.find(|own| (own.start, own.end) == (row.start, row.end)).map(|own| own.budget_tg)
+            own.find(|own| (own.start, own.end) == (row.start, row.end))
+                .map(|own| own.budget_tg)
         };
         let of_rows: Option<Vec<f64>> = rows.iter().map(same).collect();
         Ok(Self {
             of_rows: of_rows.ok_or_else(|| {
-                ComputeError::inconsistent(manifest.product.as_str(), "its rows are of other periods")
+                ComputeError::inconsistent(
+                    manifest.product.as_str(),
+                    "its rows are of other periods",
+                )
             })?,
             basis: RiverFlux {
                 source: manifest.source.clone(),
@@ -130,7 +138,9 @@ impl River {
             row.river = Some(RowRiver {
                 river_tg,
                 anthropogenic_tg: row.budget_tg - river_tg,
-                sigma_tg: row.uncertainty.map(|of_budget| of_budget.sigma_tg.hypot(own)),
+                sigma_tg: row
+                    .uncertainty
+                    .map(|of_budget| of_budget.sigma_tg.hypot(own)),
             });
         }
     }
@@ -143,7 +153,11 @@ fn covers(manifest: &Manifest, row: &BudgetRow) -> bool {
         end: row.end,
     };
     let mut until = row.start;
-    for step in manifest.steps.iter().filter(|step| step.period.overlaps(period)) {
+    for step in manifest
+        .steps
+        .iter()
+        .filter(|step| step.period.overlaps(period))
+    {
         if step.period.start > until {
             return false;
         }

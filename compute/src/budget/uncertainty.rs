@@ -67,7 +67,12 @@ pub(super) async fn of_rows(
     };
     let mut sums = vec![RowSum::default(); rows.len()];
     let periods: Vec<Period> = rows.iter().map(period).collect();
-    let overlaps = |step: &Step| periods.iter().filter(|row| row.overlaps(step.period)).count();
+    let overlaps = |step: &Step| {
+        periods
+            .iter()
+            .filter(|row| row.overlaps(step.period))
+            .count()
+    };
     let form_count = steps.iter().map(|step| overlaps(step)).sum();
     let scheme = Scheme::of(&manifest.grid, &window, errors.length_km, form_count)?;
     let mut drawing = Drawing::new(&manifest.grid, &window, &region, errors, steps.len())?;
@@ -178,7 +183,9 @@ fn assumptions(errors: &BudgetErrors, sums: &[RowSum]) -> Vec<String> {
             "the error is a share of the flux with its sign, as that of a factor is: where cells share it, sources and sinks grow \
              together"
         }
-        StatedError::Absolute { .. } => "the error is the same in every cell with a flux, whatever its flux",
+        StatedError::Absolute { .. } => {
+            "the error is the same in every cell with a flux, whatever its flux"
+        }
         StatedError::Product(_) => match errors.of_product.as_ref().map(|own| own.steps.len()) {
             Some(1) => "one map of errors holds for all steps",
             _ => "each step has the errors of its own period",

@@ -46,20 +46,29 @@ pub async fn regions(store: &Store, mask: &Manifest) -> Result<Vec<AskedRegion>,
             codes.insert(at, *value);
         }
         if codes.len() > MAX_REGIONS {
-            return Err(refused(mask, &format!("it has more than {MAX_REGIONS} codes")));
+            return Err(refused(
+                mask,
+                &format!("it has more than {MAX_REGIONS} codes"),
+            ));
         }
     }
     if codes.is_empty() {
         return Err(refused(mask, "no cell has a code"));
     }
-    codes.iter().map(|code| of_code(mask, &values, *code)).collect()
+    codes
+        .iter()
+        .map(|code| of_code(mask, &values, *code))
+        .collect()
 }
 
 /// The one map of a mask, `[row, col]`.
 async fn map(store: &Store, mask: &Manifest) -> Result<Vec<f32>, ComputeError> {
     let [step] = &mask.steps[..] else {
         let count = mask.steps.len();
-        return Err(refused(mask, &format!("the product has {count} steps; a mask is one map")));
+        return Err(refused(
+            mask,
+            &format!("the product has {count} steps; a mask is one map"),
+        ));
     };
     Ok(storage::fields::read(store, &step.field, &mask.grid).await?)
 }

@@ -55,9 +55,17 @@ async fn each_version_that_changed_the_question_is_a_line() {
     };
     let found = history(&engine, &query).await.unwrap();
     assert_eq!(found.version_count, 5);
-    let numbers: Vec<_> = found.versions.iter().map(|own| own.manifest.number).collect();
+    let numbers: Vec<_> = found
+        .versions
+        .iter()
+        .map(|own| own.manifest.number)
+        .collect();
     assert_eq!(numbers, [1, 2, 4, 5]);
-    let changed: Vec<_> = found.versions.iter().map(|own| own.changed.as_str()).collect();
+    let changed: Vec<_> = found
+        .versions
+        .iter()
+        .map(|own| own.changed.as_str())
+        .collect();
     assert_eq!(
         changed,
         [
@@ -70,10 +78,17 @@ async fn each_version_that_changed_the_question_is_a_line() {
     assert!(found.versions.is_sorted_by_key(|own| own.published));
     for (at, own) in found.versions[..3].iter().enumerate() {
         let manifest = manifests::load(&store, &own.manifest).await.unwrap();
-        let answer = compute::budget::budget_of(&engine, &query, &manifest).await.unwrap();
+        let answer = compute::budget::budget_of(&engine, &query, &manifest)
+            .await
+            .unwrap();
         assert_eq!(own.budget_kg.as_ref(), Some(&answer.rows[0].budget_kg));
-        assert_eq!(own.sigma_tg, answer.rows[0].uncertainty.map(|own| own.sigma_tg));
-        let before = at.checked_sub(1).and_then(|at| found.versions[at].budget_tg);
+        assert_eq!(
+            own.sigma_tg,
+            answer.rows[0].uncertainty.map(|own| own.sigma_tg)
+        );
+        let before = at
+            .checked_sub(1)
+            .and_then(|at| found.versions[at].budget_tg);
         let wanted = before.map(|before| answer.rows[0].budget_tg - before);
         assert_eq!(own.difference_tg, wanted);
     }
@@ -97,14 +112,21 @@ async fn a_version_is_found_by_when_it_was_published() {
         let instant = contract::time::TimeMs::new(ms).unwrap();
         manifests::as_of(&store, &id, instant).await.unwrap()
     };
-    for (ms, number) in [(first.ms(), 1), (second.ms() - 1, 1), (second.ms(), 2), (second.ms() + 9, 2)] {
+    for (ms, number) in [
+        (first.ms(), 1),
+        (second.ms() - 1, 1),
+        (second.ms(), 2),
+        (second.ms() + 9, 2),
+    ] {
         match at(ms).await {
             AtInstant::Version(own) => assert_eq!(own.number, number),
             other => panic!("{other:?}"),
         }
     }
     assert_eq!(at(first.ms() - 1).await, AtInstant::BeforeFirst(first));
-    let nothing = manifests::as_of(&store, &product("none"), first).await.unwrap();
+    let nothing = manifests::as_of(&store, &product("none"), first)
+        .await
+        .unwrap();
     assert_eq!(nothing, AtInstant::Nothing);
 }
 
@@ -120,7 +142,9 @@ async fn what_has_no_history_is_refused() {
     let refused = history(&engine, &months).await.unwrap_err();
     assert_eq!(refused.class(), ErrorClass::BadRequest);
     assert!(refused.to_string().contains("one number"), "{refused}");
-    let unknown = history(&engine, &total(&product("none"), "global")).await.unwrap_err();
+    let unknown = history(&engine, &total(&product("none"), "global"))
+        .await
+        .unwrap_err();
     assert_eq!(unknown.class(), ErrorClass::NotFound);
     let globe = ask(&engine, &total(&product("flux"), "global")).await;
     assert!(globe.uncertainty.is_none());

@@ -61,7 +61,10 @@ async fn even(store: &Store) -> Manifest {
 }
 
 fn near(found: f64, wanted: f64, slack: f64) {
-    assert!((found / wanted - 1.0).abs() < slack, "{found} is not {wanted}");
+    assert!(
+        (found / wanted - 1.0).abs() < slack,
+        "{found} is not {wanted}"
+    );
 }
 
 /// Area of the cells of [`BAND`], m².
@@ -71,7 +74,10 @@ fn areas_m2() -> Vec<f64> {
 }
 
 fn seconds() -> Vec<f64> {
-    months(2000)[..3].iter().map(|period| period.seconds()).collect()
+    months(2000)[..3]
+        .iter()
+        .map(|period| period.seconds())
+        .collect()
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -110,10 +116,19 @@ async fn both_limits_have_their_closed_form() {
     // A share of an even flux that all share is that share of the budget.
     let answer = ask(&engine, &asked("even", BAND, errors("20%", 500.0, 0.0))).await;
     let own = answer.rows[0].uncertainty.unwrap();
-    near(own.fully_correlated_tg, 0.2 * answer.rows[0].budget_tg, 1e-12);
+    near(
+        own.fully_correlated_tg,
+        0.2 * answer.rows[0].budget_tg,
+        1e-12,
+    );
     let basis = answer.uncertainty.unwrap();
     assert!(basis.scheme.contains("6 x 24 cells"), "{}", basis.scheme);
-    assert!(basis.assumptions.iter().any(|one| one.contains("each step is its own")));
+    assert!(
+        basis
+            .assumptions
+            .iter()
+            .any(|one| one.contains("each step is its own"))
+    );
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -126,14 +141,23 @@ async fn rows_of_months_add_by_squares_where_steps_are_on_their_own() {
         ..asked("even", "0,0,100,60", errors("15%", 800.0, days))
     };
     let by_month = ask(&engine, &of(BudgetStep::Month, 0.0)).await.rows;
-    let squares: f64 = by_month.iter().map(|row| row.uncertainty.unwrap().sigma_tg.powi(2)).sum();
+    let squares: f64 = by_month
+        .iter()
+        .map(|row| row.uncertainty.unwrap().sigma_tg.powi(2))
+        .sum();
     let whole = ask(&engine, &of(BudgetStep::Total, 0.0)).await.rows[0].uncertainty;
     near(whole.unwrap().sigma_tg, squares.sqrt(), 1e-12);
     // Months that go together add up to more, at most to their sum.
-    let sum: f64 = by_month.iter().map(|row| row.uncertainty.unwrap().sigma_tg).sum();
+    let sum: f64 = by_month
+        .iter()
+        .map(|row| row.uncertainty.unwrap().sigma_tg)
+        .sum();
     let joined = ask(&engine, &of(BudgetStep::Total, 90.0)).await.rows[0].uncertainty;
     let joined = joined.unwrap().sigma_tg;
-    assert!(joined > 1.2 * squares.sqrt() && joined < sum, "{joined} {sum}");
+    assert!(
+        joined > 1.2 * squares.sqrt() && joined < sum,
+        "{joined} {sum}"
+    );
     let always = ask(&engine, &of(BudgetStep::Total, 1e6)).await.rows[0].uncertainty;
     near(always.unwrap().sigma_tg, sum, 1e-4);
 }
@@ -142,7 +166,14 @@ async fn rows_of_months_add_by_squares_where_steps_are_on_their_own() {
 async fn any_number_of_parts_and_only_the_sea_of_cells() {
     let (_folder, store) = folder_store();
     let id = product("wavy");
-    land(&store, &id, Quantity::CarbonFlux, ONE_DEGREE, &wavy_year(&ONE_DEGREE)).await;
+    land(
+        &store,
+        &id,
+        Quantity::CarbonFlux,
+        ONE_DEGREE,
+        &wavy_year(&ONE_DEGREE),
+    )
+    .await;
     let query = BudgetQuery {
         step: BudgetStep::Month,
         ..asked("wavy", "100,-20,210,33.3", errors("25%", 600.0, 60.0))
@@ -155,7 +186,8 @@ async fn any_number_of_parts_and_only_the_sea_of_cells() {
         ..query
     };
     let sea = ask(&Engine::local(store), &sea).await;
-    let sigma = |answer: &contract::budget::BudgetAnswer| answer.rows[0].uncertainty.unwrap().sigma_tg;
+    let sigma =
+        |answer: &contract::budget::BudgetAnswer| answer.rows[0].uncertainty.unwrap().sigma_tg;
     assert!(sigma(&sea) < sigma(&one) && sigma(&sea) > 0.5 * sigma(&one));
 }
 
@@ -163,7 +195,10 @@ async fn any_number_of_parts_and_only_the_sea_of_cells() {
 async fn error_product(store: &Store, name: &str, grid: Grid, steps: &[Period]) -> Arc<Manifest> {
     let value = |cell: usize| if cell % 24 < 6 { f32::NAN } else { FLUX / 8.0 };
     let values: Vec<f32> = (0..grid.cell_count()).map(value).collect();
-    let steps: Vec<_> = steps.iter().map(|period| (*period, values.clone())).collect();
+    let steps: Vec<_> = steps
+        .iter()
+        .map(|period| (*period, values.clone()))
+        .collect();
     let quantity = Quantity::open("flux_standard_error", "mol m-2 s-1", "Standard error").unwrap();
     Arc::new(land(store, &product(name), quantity, grid, &steps).await)
 }
@@ -183,7 +218,10 @@ async fn errors_of_a_product_count_where_it_has_them_and_that_is_said() {
     let map = error_product(&store, "error-map", GRID, &[Period::year(1990).unwrap()]).await;
     let engine = Engine::local(store);
     let share = f64::from(FLUX) / 8.0 * CARBON_KG_PER_MOL;
-    let columns = areas_m2().into_iter().enumerate().filter(|(cell, _)| cell % 24 >= 6);
+    let columns = areas_m2()
+        .into_iter()
+        .enumerate()
+        .filter(|(cell, _)| cell % 24 >= 6);
     let months = seconds();
     let squares: f64 = columns
         .flat_map(|(_, area)| months.iter().map(move |s| (share * area * s).powi(2)))
@@ -244,7 +282,8 @@ struct Reference {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn an_independent_sum_over_pairs_of_the_real_grids_says_the_same() {
-    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/reference/budget_uncertainty.py");
+    let script =
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/reference/budget_uncertainty.py");
     let printed = Command::new(test_data::python())
         .arg("-B")
         .arg(script)
@@ -256,7 +295,14 @@ async fn an_independent_sum_over_pairs_of_the_real_grids_says_the_same() {
     let expected: Vec<Reference> = serde_json::from_slice(&printed.stdout).unwrap();
     let (_folder, store) = folder_store();
     let id = product("takahashi09-flux");
-    land(&store, &id, Quantity::CarbonFlux, ONE_DEGREE, &takahashi_year()).await;
+    land(
+        &store,
+        &id,
+        Quantity::CarbonFlux,
+        ONE_DEGREE,
+        &takahashi_year(),
+    )
+    .await;
     let engine = Engine::in_process(store, parts(2));
     let absolute = "0.5 mol m-2 year-1";
     let questions = [
@@ -271,6 +317,10 @@ async fn an_independent_sum_over_pairs_of_the_real_grids_says_the_same() {
         assert_eq!(expected.question, question);
         let answer = ask(&engine, &asked("takahashi09-flux", "14n-50n", errors)).await;
         near(answer.rows[0].budget_tg, expected.budget_tg, 1e-6);
-        near(answer.rows[0].uncertainty.unwrap().sigma_tg, expected.sigma_tg, 1e-6);
+        near(
+            answer.rows[0].uncertainty.unwrap().sigma_tg,
+            expected.sigma_tg,
+            1e-6,
+        );
     }
 }

@@ -131,7 +131,13 @@ mod tests {
         let names: Vec<_> = products.iter().map(ProductId::as_str).collect();
         assert_eq!(names, ["basins", "errors", "rivers"]);
         let query = BudgetQuery::new("flux".parse().unwrap(), "global".parse().unwrap());
-        assert_eq!(BudgetWords::default().asked().unwrap().of(query.clone(), &BTreeMap::new()), Ok(query.clone()));
+        assert_eq!(
+            BudgetWords::default()
+                .asked()
+                .unwrap()
+                .of(query.clone(), &BTreeMap::new()),
+            Ok(query.clone())
+        );
         assert!(besides.of(query, &BTreeMap::new()).is_err());
         let bad = BudgetWords {
             regions: Some("A FILE"),

@@ -37,7 +37,8 @@ impl FromStr for AsOf {
 impl AsOf {
     /// What is said where the first version that is kept is younger.
     pub fn before_first(product: &ProductId, instant: TimeMs, first: TimeMs) -> ContractError {
-        let reason = format!("the first version of {product} that is kept was published at {first}");
+        let reason =
+            format!("the first version of {product} that is kept was published at {first}");
         ContractError::invalid("version as of", &instant.to_string(), reason)
     }
 }

@@ -70,8 +70,7 @@ fn number_and_unit(text: &str) -> Option<(f64, &str)> {
     let is_of_number = |(at, c): (usize, char)| {
         let is_exponent = matches!(c, 'e' | 'E')
             && text[at + 1..].starts_with(|c: char| c.is_ascii_digit() || c == '-' || c == '+');
-        let is_sign = matches!(c, '+' | '-')
-            && (at == 0 || text[..at].ends_with(['e', 'E']));
+        let is_sign = matches!(c, '+' | '-') && (at == 0 || text[..at].ends_with(['e', 'E']));
         c.is_ascii_digit() || c == '.' || is_exponent || is_sign
     };
     let end = text
@@ -290,10 +289,7 @@ mod tests {
                 unit: unit.to_owned(),
             })
         };
-        assert_eq!(
-            of("0.3 mol m-2 year-1"),
-            absolute(0.3, "mol m-2 year-1")
-        );
+        assert_eq!(of("0.3 mol m-2 year-1"), absolute(0.3, "mol m-2 year-1"));
         assert_eq!(of("1e-9kg m-2 s-1"), absolute(1e-9, "kg m-2 s-1"));
         let product = StatedError::Product("somffn-error".parse().unwrap());
         assert_eq!(of("somffn-error"), Ok(product));

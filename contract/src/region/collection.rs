@@ -33,7 +33,9 @@ fn read(text: &str) -> Result<Vec<AskedRegion>, String> {
     };
     let count = collection.features.len();
     if !(1..=MAX_REGIONS).contains(&count) {
-        return Err(format!("it holds {count} features: 1 to {MAX_REGIONS} are taken"));
+        return Err(format!(
+            "it holds {count} features: 1 to {MAX_REGIONS} are taken"
+        ));
     }
     let mut names = BTreeSet::new();
     let mut regions = vec![];
@@ -60,7 +62,9 @@ fn read(text: &str) -> Result<Vec<AskedRegion>, String> {
 fn name(feature: &Feature) -> Option<String> {
     let of_property = || {
         let properties = feature.properties.as_ref()?;
-        let mut found = NAMES.iter().filter_map(|name| properties.get(*name)?.as_str());
+        let mut found = NAMES
+            .iter()
+            .filter_map(|name| properties.get(*name)?.as_str());
         found.next().map(str::to_owned)
     };
     let of_id = || match feature.id.as_ref()? {
@@ -103,20 +107,28 @@ mod tests {
         let named = |name: &str, geometry: &str| {
             feature(&format!(r#""properties":{{"name":"{name}"}}"#), geometry)
         };
-        let many: Vec<_> = (0..=MAX_REGIONS).map(|i| named(&i.to_string(), SQUARE)).collect();
+        let many: Vec<_> = (0..=MAX_REGIONS)
+            .map(|i| named(&i.to_string(), SQUARE))
+            .collect();
         for (text, wanted) in [
             (SQUARE.to_owned(), "FeatureCollection is wanted"),
             ("POLYGON((0 0,1 0,1 1,0 0))".to_owned(), "no GeoJSON"),
             (collection(&[]), "0 features"),
             (collection(&many), "101 features"),
-            (collection(&[feature(r#""properties":{}"#, SQUARE)]), "feature 1 has no name"),
+            (
+                collection(&[feature(r#""properties":{}"#, SQUARE)]),
+                "feature 1 has no name",
+            ),
             (collection(&[named(&"x".repeat(101), SQUARE)]), "no name"),
             (collection(&[named("a", "null")]), "holds no Polygon"),
             (
                 collection(&[named("a", r#"{"type":"Point","coordinates":[0,0]}"#)]),
                 "a Point has no area",
             ),
-            (collection(&[named("a", SQUARE), named("a", SQUARE)]), "two features"),
+            (
+                collection(&[named("a", SQUARE), named("a", SQUARE)]),
+                "two features",
+            ),
         ] {
             let refused = named_regions(&text).unwrap_err().to_string();
             assert!(refused.contains(wanted), "{text}: {refused}");

@@ -95,7 +95,11 @@ pub(super) fn first_line(error: &dyn std::fmt::Display) -> String {
     line.chars().take(200).collect()
 }
 
-pub(super) fn collect(geometry: &Geometry, depth: usize, polygons: &mut Vec<Polygon>) -> Result<(), String> {
+pub(super) fn collect(
+    geometry: &Geometry,
+    depth: usize,
+    polygons: &mut Vec<Polygon>,
+) -> Result<(), String> {
     match &geometry.value {
         GeometryValue::Polygon { coordinates } => polygons.push(geojson_polygon(coordinates)?),
         GeometryValue::MultiPolygon { coordinates } => {

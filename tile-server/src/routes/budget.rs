@@ -97,9 +97,8 @@ impl BudgetParameters {
     }
 
     fn words(&self) -> Result<BudgetWords<'_>, ServerError> {
-        let optional = |what, text: Option<&str>, unit| {
-            text.map(|text| number(what, text, unit)).transpose()
-        };
+        let optional =
+            |what, text: Option<&str>, unit| text.map(|text| number(what, text, unit)).transpose();
         let length = self.correlation_length_km.as_deref();
         let days = self.correlation_days.as_deref();
         let draws = self.monte_carlo.as_deref();
@@ -108,7 +107,9 @@ impl BudgetParameters {
                 error: self.error.as_deref(),
                 correlation_length_km: optional("correlation_length_km", length, "km")?,
                 correlation_days: optional("correlation_days", days, "days")?,
-                monte_carlo: draws.map(|text| whole_number("monte_carlo", text, DRAWS)).transpose()?,
+                monte_carlo: draws
+                    .map(|text| whole_number("monte_carlo", text, DRAWS))
+                    .transpose()?,
                 seed: seed(self.seed.as_deref())?,
             },
             river_flux: self.river_flux.as_deref(),

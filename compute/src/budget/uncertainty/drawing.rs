@@ -74,7 +74,9 @@ impl Drawing {
         self.steps.push(DrawnStep {
             middle_days: 0.5 * (start.ms() as f64 + end.ms() as f64) / DAY_MS,
             blocks: own.blocks,
-            rows: inside.map(|(row, inside_ms)| (row, inside_ms as f64 / 1000.0)).collect(),
+            rows: inside
+                .map(|(row, inside_ms)| (row, inside_ms as f64 / 1000.0))
+                .collect(),
         });
         Ok(())
     }

@@ -50,9 +50,16 @@ impl Draws {
         let transform = Transform::new(round);
         let of_rows: Vec<Vec<Vec<f64>>> = (0..rows)
             .into_par_iter()
-            .map(|row| (0..=row).map(|other| pairs.round(row, other, &transform)).collect())
+            .map(|row| {
+                (0..=row)
+                    .map(|other| pairs.round(row, other, &transform))
+                    .collect()
+            })
             .collect();
-        let factors = (0..=round / 2).into_par_iter().map(|wave| factor(&of_rows, wave)).collect();
+        let factors = (0..=round / 2)
+            .into_par_iter()
+            .map(|wave| factor(&of_rows, wave))
+            .collect();
         Self {
             rows,
             cols: plane.cols,
@@ -78,8 +85,11 @@ impl Draws {
         let (size, waves) = (self.transform.size(), self.factors.len());
         let mut sums = vec![0.0; row_count];
         let mut waves_now = vec![Complex::default(); self.rows * waves];
-        let mut then_days = None;
-        let (mut row, mut field) = (vec![Complex::default(); size], vec![Complex::default(); size]);
+        let mut then_days: Option<f64> = None;
+        let (mut row, mut field) = (
+            vec![Complex::default(); size],
+            vec![Complex::default(); size],
+        );
         for (number, step) in (0..).zip(steps) {
             let left = match then_days {
                 Some(then) if self.days > 0.0 => (-(step.middle_days - then) / self.days).exp(),
@@ -93,11 +103,19 @@ impl Draws {
                 for wave in 0..size {
                     // A row of real numbers: waves beyond the half are mirror images.
                     let mirrored = own[wave.min(size - wave)];
-                    let im = if 2 * wave <= size { -mirrored.im } else { mirrored.im };
+                    let im = if 2 * wave <= size {
+                        -mirrored.im
+                    } else {
+                        mirrored.im
+                    };
                     row[wave] = Complex::new(mirrored.re, im);
                 }
                 self.transform.process(&row, &mut field);
-                sum += blocks.iter().zip(&field).map(|(own, error)| own * error.re).sum::<f64>();
+                sum += blocks
+                    .iter()
+                    .zip(&field)
+                    .map(|(own, error)| own * error.re)
+                    .sum::<f64>();
             }
             sum /= (size as f64).sqrt();
             for (row, seconds) in &step.rows {
@@ -116,7 +134,8 @@ impl Draws {
             let has_mirror = wave != 0 && 2 * wave != self.transform.size();
             for (pair, drawn) in drawn.chunks_mut(2).enumerate() {
                 let own = normals([pair as u32, wave as u32, step, draw], self.seed);
-                for (drawn, [re, im]) in drawn.iter_mut().zip([[own[0], own[1]], [own[2], own[3]]]) {
+                for (drawn, [re, im]) in drawn.iter_mut().zip([[own[0], own[1]], [own[2], own[3]]])
+                {
                     *drawn = if has_mirror {
                         Complex::new(re * 0.5f64.sqrt(), im * 0.5f64.sqrt())
                     } else {
@@ -151,7 +170,9 @@ fn factor(of_rows: &[Vec<Vec<f64>>], wave: usize) -> Vec<f64> {
                 left -= own[at(row, before)] * own[at(col, before)];
             }
             own[at(row, col)] = if row == col {
-                (left + JITTER * of_rows[row][row][wave].abs()).max(0.0).sqrt()
+                (left + JITTER * of_rows[row][row][wave].abs())
+                    .max(0.0)
+                    .sqrt()
             } else {
                 let diagonal: f64 = own[at(col, col)];
                 if diagonal > 0.0 { left / diagonal } else { 0.0 }
@@ -194,14 +215,21 @@ mod tests {
                 })
             };
             let own = pairs.sums(&[form(0, 0), form(1, 1), form(0, 1)]);
-            let rho = if days > 0.0 { f64::exp(-30.0 / days) } else { 0.0 };
+            let rho = if days > 0.0 {
+                f64::exp(-30.0 / days)
+            } else {
+                0.0
+            };
             let variance = 4.0 * (own[0] + own[1] + 2.0 * rho * own[2]);
             let draws = 4000;
             let found = Draws::new(&plane, length_km, days, 11, 24).run(&steps, 1, draws);
             let spread = found[0].iter().map(|x| x * x).sum::<f64>() / f64::from(draws);
             // Four standard errors of a variance of so many draws.
             let slack = 4.0 * (2.0 / f64::from(draws)).sqrt();
-            assert!((spread / variance - 1.0).abs() < slack, "{spread} {variance}");
+            assert!(
+                (spread / variance - 1.0).abs() < slack,
+                "{spread} {variance}"
+            );
         }
     }
 

@@ -105,7 +105,10 @@ fn refused(what: &str, reason: &str) -> ComputeError {
 
 /// What makes kg m⁻² s⁻¹ of carbon of a number in a unit; a word `C` says that mass is of carbon, which it is anyway.
 fn factor_of(unit: &str) -> Option<f64> {
-    let words: Vec<&str> = unit.split_whitespace().filter(|word| *word != "C").collect();
+    let words: Vec<&str> = unit
+        .split_whitespace()
+        .filter(|word| *word != "C")
+        .collect();
     let scaled = Scaled::parse(&words.join(" ")).filter(|scaled| scaled.offset == 0.0)?;
     if Some(scaled.unit) == Unit::stored("kg m-2 s-1") {
         Some(scaled.factor)
@@ -120,7 +123,9 @@ fn stored<'a>(manifest: &'a Manifest, flux: &Manifest) -> Result<Stored<'a>, Com
     let name = manifest.product.as_str();
     let unit = manifest.quantity.unit();
     let Some(factor) = factor_of(unit) else {
-        let reason = format!("its unit {unit:?} is none of a flux of carbon, as standard errors of one have");
+        let reason = format!(
+            "its unit {unit:?} is none of a flux of carbon, as standard errors of one have"
+        );
         return Err(refused(name, &reason));
     };
     if !are_same_cells(&manifest.grid, &flux.grid) {
@@ -146,7 +151,9 @@ impl Stored<'_> {
         let own = self.manifest.step_of(period).and_then(|at| steps.get(at));
         let only = || Some(steps).filter(|steps| steps.len() == 1)?.first();
         own.or_else(only).ok_or_else(|| {
-            let reason = format!("it has no step of exactly {period}, as the flux has, and is no single map");
+            let reason = format!(
+                "it has no step of exactly {period}, as the flux has, and is no single map"
+            );
             refused(self.manifest.product.as_str(), &reason)
         })
     }

@@ -35,7 +35,11 @@ impl Pairs {
     /// `length_km` is above 0.
     pub(super) fn new(plane: Plane, length_km: f64) -> Self {
         let size = transform_size(&plane);
-        let haversine = |cols: usize| (0.5 * (cols as f64 * plane.dlon_deg).to_radians()).sin().powi(2);
+        let haversine = |cols: usize| {
+            (0.5 * (cols as f64 * plane.dlon_deg).to_radians())
+                .sin()
+                .powi(2)
+        };
         Self {
             transform: Transform::new(size),
             haversines: (0..=size / 2).map(haversine).collect(),
@@ -53,7 +57,10 @@ impl Pairs {
     pub(super) fn spectrum(&self, form: &Form) -> Spectrum {
         let (cols, size) = (self.plane.cols, self.transform.size());
         let mut all = Vec::with_capacity(self.plane.lats_deg.len() * self.waves());
-        let (mut row, mut waves) = (vec![Complex::default(); size], vec![Complex::default(); size]);
+        let (mut row, mut waves) = (
+            vec![Complex::default(); size],
+            vec![Complex::default(); size],
+        );
         for (x, y) in form.x.chunks(cols).zip(form.y.chunks(cols)) {
             // Two rows of real numbers at once, as the parts of one of complex ones.
             for (both, (x, y)) in row.iter_mut().zip(x.iter().zip(y)) {
@@ -91,7 +98,10 @@ impl Pairs {
     fn of_row(&self, row: usize, forms: &[Spectrum]) -> Vec<f64> {
         let mut sums = vec![0.0; forms.len()];
         let size = self.transform.size();
-        let (mut table, mut kernel) = (vec![Complex::default(); size], vec![Complex::default(); size]);
+        let (mut table, mut kernel) = (
+            vec![Complex::default(); size],
+            vec![Complex::default(); size],
+        );
         let rows = self.plane.lats_deg.len();
         for first in (row..rows).step_by(2) {
             let second = (first + 1).min(rows - 1);
@@ -104,11 +114,13 @@ impl Pairs {
                 let along = |other: usize, of: fn(&Complex) -> f64| {
                     let other = self.waves_of(form, other);
                     let waves = kernel.iter().map(of).zip(own.iter().zip(other));
-                    waves.enumerate().fold(0.0, |sum, (wave, (kernel, (a, b)))| {
-                        let here = a[0] * b[2] + a[1] * b[3];
-                        let there = b[0] * a[2] + b[1] * a[3];
-                        self.times(wave) * kernel * (here + there) + sum
-                    })
+                    waves
+                        .enumerate()
+                        .fold(0.0, |sum, (wave, (kernel, (a, b)))| {
+                            let here = a[0] * b[2] + a[1] * b[3];
+                            let there = b[0] * a[2] + b[1] * a[3];
+                            self.times(wave) * kernel * (here + there) + sum
+                        })
                 };
                 let share = if is_diagonal { 0.5 } else { 1.0 };
                 *sum += share * along(first, |both| both.re);
@@ -123,7 +135,10 @@ impl Pairs {
     /// How two rows go together wave by wave where as many columns as `transform` takes go round.
     pub(super) fn round(&self, row: usize, other: usize, transform: &Transform) -> Vec<f64> {
         let size = transform.size();
-        let (mut table, mut waves) = (vec![Complex::default(); size], vec![Complex::default(); size]);
+        let (mut table, mut waves) = (
+            vec![Complex::default(); size],
+            vec![Complex::default(); size],
+        );
         self.kernels(row, [other, other], &mut table);
         transform.process(&table, &mut waves);
         waves[..=size / 2].iter().map(|wave| wave.re).collect()

@@ -11,9 +11,8 @@ pub(super) fn philox(counter: [u32; 4], seed: u64) -> [u32; 4] {
     let mut key = [seed as u32, (seed >> 32) as u32];
     let mut now = counter;
     for _ in 0..ROUNDS {
-        let [low, high] = [0, 1].map(|half| {
-            u64::from(MULTIPLIERS[half]) * u64::from(now[2 * half])
-        });
+        let [low, high] =
+            [0, 1].map(|half| u64::from(MULTIPLIERS[half]) * u64::from(now[2 * half]));
         now = [
             (high >> 32) as u32 ^ now[1] ^ key[0],
             high as u32,
@@ -73,6 +72,9 @@ mod tests {
         let variance = all.iter().map(|x| x * x).sum::<f64>() / n;
         // Four standard errors.
         assert!(mean.abs() < 4.0 / n.sqrt(), "{mean}");
-        assert!((variance - 1.0).abs() < 4.0 * (2.0 / n).sqrt(), "{variance}");
+        assert!(
+            (variance - 1.0).abs() < 4.0 * (2.0 / n).sqrt(),
+            "{variance}"
+        );
     }
 }

@@ -176,7 +176,10 @@ mod tests {
     fn a_region_across_the_date_line_is_one_short_run() {
         let own = window(&[(3, 34), (4, 1)]);
         assert_eq!(own.size(), (2, 4));
-        assert_eq!((own.block_of(3 * 36 + 34), own.block_of(4 * 36 + 1)), (0, 7));
+        assert_eq!(
+            (own.block_of(3 * 36 + 34), own.block_of(4 * 36 + 1)),
+            (0, 7)
+        );
         let plane = own.plane(&GRID);
         assert!(!plane.is_ring && plane.lats_deg == [55.0, 45.0]);
     }

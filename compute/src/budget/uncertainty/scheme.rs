@@ -60,7 +60,8 @@ impl Scheme {
         };
         let (rows, cols) = window.size();
         if window.block == 1 {
-            let words = format!("all pairs of {rows} x {cols} cells, by Fourier transforms of rows");
+            let words =
+                format!("all pairs of {rows} x {cols} cells, by Fourier transforms of rows");
             return Ok(Self {
                 window,
                 at_once,
@@ -184,7 +185,11 @@ mod tests {
         let of = |length_km, forms| Scheme::of(&grid, &window, length_km, forms);
         assert_eq!(of(500.0, 12).unwrap().window.block, 1);
         let days = of(2000.0, 5844).unwrap();
-        assert!(days.window.block > 1 && days.words.contains("blocks"), "{}", days.words);
+        assert!(
+            days.window.block > 1 && days.words.contains("blocks"),
+            "{}",
+            days.words
+        );
         let refused = of(150.0, 5844).unwrap_err().to_string();
         assert!(refused.contains("does not hold 2"), "{refused}");
         assert_eq!(of(0.0, 5844).unwrap().window.block, 1);

@@ -26,7 +26,12 @@ pub(super) struct Summing {
 }
 
 impl Summing {
-    pub(super) fn new(grid: &Grid, scheme: Scheme, region: Arc<RegionWeights>, errors: &BudgetErrors) -> Self {
+    pub(super) fn new(
+        grid: &Grid,
+        scheme: Scheme,
+        region: Arc<RegionWeights>,
+        errors: &BudgetErrors,
+    ) -> Self {
         let plane = scheme.window.plane(grid);
         let pairs = (errors.length_km > 0.0).then(|| Arc::new(Pairs::new(plane, errors.length_km)));
         Self {

@@ -92,7 +92,8 @@ impl Transform {
                 *turned = to[q * part + k].times(self.roots[q * k * stride]);
             }
             for r in 0..radix {
-                let term = |q: usize| turned[q].times(self.roots[q * r * part * stride % self.size]);
+                let term =
+                    |q: usize| turned[q].times(self.roots[q * r * part * stride % self.size]);
                 to[r * part + k] = (0..radix).map(term).fold(Complex::default(), Complex::plus);
             }
         }
@@ -148,6 +149,9 @@ mod tests {
 
     #[test]
     fn quick_sizes_have_small_primes_only() {
-        assert_eq!([1, 7, 13, 31, 719, 1000].map(quick_size), [1, 8, 15, 32, 720, 1000]);
+        assert_eq!(
+            [1, 7, 13, 31, 719, 1000].map(quick_size),
+            [1, 8, 15, 32, 720, 1000]
+        );
     }
 }

@@ -8,7 +8,14 @@ use super::M2_PER_MILLION_KM2;
 use crate::progress;
 
 /// Columns of days and words, which stand to the left.
-const WORDS: [&str; 6] = ["region", "from", "to", "version", "published", "what it changed"];
+const WORDS: [&str; 6] = [
+    "region",
+    "from",
+    "to",
+    "version",
+    "published",
+    "what it changed",
+];
 
 /// A line a row; of several regions each has its lines, and the whole stands last.
 pub(super) fn of(answer: &BudgetAnswer) -> Table {
@@ -101,7 +108,9 @@ impl Columns {
         }
         if self.river {
             let of = |part: fn(&contract::budget::RowRiver) -> f64| {
-                row.river.as_ref().map_or_else(String::new, |own| format!("{:.3}", part(own)))
+                row.river
+                    .as_ref()
+                    .map_or_else(String::new, |own| format!("{:.3}", part(own)))
             };
             cells.extend([of(|own| own.river_tg), of(|own| own.anthropogenic_tg)]);
             if self.uncertainty {
@@ -116,8 +125,14 @@ impl Columns {
             format!("{:.3}", row.gap_area_m2 / M2_PER_MILLION_KM2),
         ]);
         if let Some(completeness) = &row.completeness {
-            cells.push(format!("{:.3}", completeness.complete_m2 / M2_PER_MILLION_KM2));
-            cells.push(format!("{:.3}", completeness.incomplete_m2 / M2_PER_MILLION_KM2));
+            cells.push(format!(
+                "{:.3}",
+                completeness.complete_m2 / M2_PER_MILLION_KM2
+            ));
+            cells.push(format!(
+                "{:.3}",
+                completeness.incomplete_m2 / M2_PER_MILLION_KM2
+            ));
             let percent = completeness.percent();
             cells.push(percent.map_or("no data".to_owned(), |percent| format!("{percent:.1}")));
         }

@@ -34,7 +34,7 @@ fn len(plane: &Plane) -> usize {
 fn form(cells: usize, turn: f64) -> Form {
     let wave = |i: usize, turn: f64| {
         // Some cells hold nothing, as land does.
-        if i.is_multiple_of(7) {
+        if i % 7 == 3 {
             0.0
         } else {
             1.5 + (i as f64 * turn).sin()
