@@ -160,6 +160,7 @@ fn cost(grid: &Grid, window: &Window, form_count: usize) -> (f64, usize) {
 
 #[cfg(test)]
 mod tests {
+    use super::super::pairs::{Form, Pairs};
     use super::*;
     use crate::region::loaded::RegionWeights;
     use contract::chunk::field_chunks;
@@ -202,5 +203,39 @@ mod tests {
         assert!(scheme.window.block <= 2, "{}", scheme.words);
         let refused = Scheme::of(&grid, &window, 1000.0, 1 << 40).unwrap_err();
         assert!(refused.to_string().contains("smaller one"), "{refused}");
+    }
+
+    #[test]
+    fn blocks_that_the_length_holds_twice_change_an_error_by_less_than_a_hundredth() {
+        let grid = Grid {
+            rows: 42,
+            cols: 60,
+            north_deg: 50.0,
+            west_deg: 0.0,
+            dlat_deg: 1.0,
+            dlon_deg: 1.0,
+        };
+        let chunks = (0..).zip(field_chunks(&grid));
+        let areas = chunks.map(|(chunk, window)| (chunk, vec![1.0; window.cell_count()]));
+        let cells = Window::of(&grid, &RegionWeights::new(areas.collect())).unwrap();
+        // Three cells of four hold something.
+        let share = |cell: usize| match cell % 4 {
+            0 => 0.0,
+            _ => 1.0 + 0.5 * (cell as f64 / 50.0).sin(),
+        };
+        for block in [2, 3, 6] {
+            let blocks = cells.with_blocks(block).unwrap();
+            let length_km = BLOCKS_IN_LENGTH * blocks.block_km(&grid);
+            let sigma = |window: &Window| {
+                let (rows, cols) = window.size();
+                let mut x = vec![0.0; rows * cols];
+                (0..grid.cell_count()).for_each(|cell| x[window.block_of(cell)] += share(cell));
+                let pairs = Pairs::new(window.plane(&grid), length_km);
+                let form = Form { y: x.clone(), x };
+                pairs.sums(&[pairs.spectrum(&form)])[0].sqrt()
+            };
+            let ratio = sigma(&blocks) / sigma(&cells);
+            assert!((ratio - 1.0).abs() < 0.01, "{block}: {ratio}");
+        }
     }
 }
