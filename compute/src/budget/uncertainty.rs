@@ -1,6 +1,6 @@
 //! How uncertain the rows of a budget are: standard errors of the flux, propagated with what cells and steps have in common.
 //!
-//! variance = sum over cells i, j and steps s, t of w_is w_jt exp(-d_ij / length) exp(-|t_s - t_t| / days), where w is area x time x
+//! variance = the sum over every two cells and every two steps of `w w' exp(-d / length) exp(-t / days)`, where w is area x time x
 //! standard error. Nothing is left out (docs/decisions/030).
 
 mod drawing;

@@ -117,7 +117,9 @@ fn radices(mut size: usize) -> Vec<usize> {
 
 /// The least size from a number on that has small primes only.
 pub(super) fn quick_size(at_least: usize) -> usize {
-    (at_least.max(1)..)
+    let at_least = at_least.max(1);
+    // There is a power of two below twice any number.
+    (at_least..2 * at_least)
         .find(|size| radices(*size).iter().all(|radix| *radix <= LARGEST_RADIX))
         .unwrap_or(at_least)
 }
