@@ -6,13 +6,18 @@ pub mod bands;
 pub mod chunk;
 pub mod fixed;
 pub mod gaps;
+mod history;
 mod measure;
 pub mod named;
 pub(crate) mod over_region;
+mod parts;
 mod query;
+mod river;
 pub mod rows;
 pub mod running;
 pub mod sums;
+mod uncertainty;
 
+pub use history::history;
 pub use measure::Measure;
 pub use query::{budget, budget_of};

@@ -50,6 +50,12 @@ pub enum ComputeError {
         /// What is wrong and what to do.
         reason: String,
     },
+    /// Errors of a flux that cannot be those of a budget.
+    #[error("uncertainty: {reason}")]
+    Uncertainty {
+        /// What is wrong and what to do.
+        reason: String,
+    },
     /// A region file that cannot be read or holds no region.
     #[error("region file {file}: {reason}")]
     RegionFile {
@@ -148,6 +154,7 @@ impl ComputeError {
             | Self::RegionOutside { .. }
             | Self::Region { .. }
             | Self::OceanShares { .. }
+            | Self::Uncertainty { .. }
             | Self::RegionFile { .. }
             | Self::Expression { .. }
             | Self::SchedulerUrl { .. }

@@ -1,5 +1,11 @@
 //! Carbon budgets as people ask for them and as they are answered, the same on the command line and over HTTP.
 
+mod besides;
+mod closure;
+mod history;
+mod river;
+mod uncertainty;
+
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
@@ -12,6 +18,14 @@ use crate::product::ProductId;
 use crate::quantity::Quantity;
 use crate::region::{AskedRegion, Cells, Region};
 use crate::time::{Period, TimeMs};
+
+pub use besides::{Besides, BudgetWords};
+pub use closure::{Closure, RegionBudget, RegionsClosure};
+pub use history::{AsOf, BudgetHistory, VersionBudget};
+pub use river::{AskedRiver, RiverFlux, RowRiver, StatedRiver};
+pub use uncertainty::{
+    BudgetErrors, BudgetUncertainty, ErrorWords, MonteCarlo, RowDraws, RowUncertainty, StatedError,
+};
 
 /// What one row of a budget covers.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash, Serialize, Deserialize, ToSchema)]
@@ -68,6 +82,12 @@ pub struct BudgetQuery {
     pub cells: Cells,
     /// A version of a product on the same grid that says how much of every cell is sea or land; Natural Earth if absent.
     pub ocean: Option<Arc<Manifest>>,
+    /// Errors of the flux, if the budget's uncertainty is asked for.
+    pub errors: Option<BudgetErrors>,
+    /// Outgassing of river carbon that is taken off.
+    pub river: Option<AskedRiver>,
+    /// Parts of the region that are asked for by themselves too, and held against the whole.
+    pub parts: Option<BudgetParts>,
 }
 
 impl BudgetQuery {
@@ -83,6 +103,9 @@ impl BudgetQuery {
             earth: Earth::default(),
             cells: Cells::default(),
             ocean: None,
+            errors: None,
+            river: None,
+            parts: None,
         }
     }
 
@@ -103,6 +126,30 @@ impl BudgetQuery {
                 let name = manifest.product.as_str();
                 Err(ContractError::invalid("product", name, reason))
             }
+        }
+    }
+}
+
+/// Parts of a region.
+#[derive(Debug, Clone, PartialEq)]
+pub enum BudgetParts {
+    /// Regions with names, of GeoJSON say.
+    Regions(Vec<AskedRegion>),
+    /// Every code of a mask: a version of a product of one map.
+    Mask(Arc<Manifest>),
+}
+
+impl BudgetParts {
+    /// All that an answer depends on, for keys of answers.
+    pub fn key(&self) -> impl Serialize + use<> {
+        match self {
+            Self::Regions(regions) => {
+                let named = regions
+                    .iter()
+                    .map(|one| (one.name.clone(), one.region.clone()));
+                (Some(named.collect::<Vec<_>>()), None)
+            }
+            Self::Mask(mask) => (None, Some(mask.id())),
         }
     }
 }
@@ -139,8 +186,24 @@ pub struct BudgetAnswer {
     pub gap_basis: String,
     /// How the region was taken where that may surprise.
     pub notes: Vec<String>,
+    /// How uncertainties were reckoned, if they were asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub uncertainty: Option<BudgetUncertainty>,
+    /// The river flux that was taken off, if one was given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub river: Option<RiverFlux>,
     /// Rows in the order of time.
     pub rows: Vec<BudgetRow>,
+    /// The same of each part of the region that was asked for by itself.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schema(required = false)]
+    pub regions: Vec<RegionBudget>,
+    /// Do rows sum to their period, and regions to the whole? None of a single row of one region.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub closure: Option<Closure>,
 }
 
 /// The budget of one period.
@@ -175,6 +238,14 @@ pub struct BudgetRow {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub completeness: Option<Completeness>,
+    /// How uncertain the budget is, if that was asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub uncertainty: Option<RowUncertainty>,
+    /// The budget less a river flux, if one was given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub river: Option<RowRiver>,
 }
 
 /// How complete a row of accumulated carbon is: a cell with one month of twelve is not a complete one.

@@ -2,6 +2,7 @@
 
 mod asked;
 mod cells;
+mod collection;
 mod named;
 mod text;
 
@@ -10,6 +11,7 @@ use serde::{Deserialize, Serialize};
 use crate::ContractError;
 pub use asked::AskedRegion;
 pub use cells::Cells;
+pub use collection::{MAX_REGIONS, named_regions};
 pub use named::{NAMED_REGIONS, NamedRegion};
 pub use text::MAX_TEXT_BYTES;
 

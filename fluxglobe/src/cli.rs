@@ -2,6 +2,7 @@
 
 mod analysis;
 mod annotations;
+mod budget;
 mod derive;
 mod derived;
 mod export;
@@ -20,18 +21,16 @@ use std::num::NonZeroU16;
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
-use contract::budget::BudgetStep;
-use contract::earth::Earth;
 use contract::grid::LonLatDeg;
 use contract::job::Mode;
 use contract::product::ProductId;
-use contract::region::Cells;
 use contract::time::TimeMs;
 
 pub(crate) use analysis::{
     Place, PlotFile, PlotForm, StatsCorrelate, StatsDifference, StatsHovmoller,
 };
 pub(crate) use annotations::Annotated;
+pub(crate) use budget::Budget;
 pub(crate) use derive::{Derive, DeriveCo2Flux, DeriveWhat, Expression, Regrid};
 pub(crate) use derived::DeriveStatistic;
 pub(crate) use export::{Export, ExportFormat, ExportedProduct};
@@ -146,7 +145,7 @@ pub(crate) enum Command {
     #[command(subcommand)]
     Stats(Stats),
     /// Integrate a flux over a region and time (Tg C, positive out of the sea).
-    Budget(Budget),
+    Budget(Box<Budget>),
     /// Compute a product from others: by an expression, the flux of CO2, another grid, or accumulated.
     Derive(Box<Derive>),
     /// Draw a picture.
@@ -285,40 +284,6 @@ pub(crate) struct Products {
     /// More about one product.
     #[command(subcommand)]
     pub(crate) of: Option<ProductsOf>,
-    /// JSON instead of a table.
-    #[arg(long)]
-    pub(crate) json: bool,
-}
-
-/// `fluxglobe budget`.
-#[derive(Debug, Args)]
-pub(crate) struct Budget {
-    /// Product, a carbon flux.
-    #[arg(long)]
-    pub(crate) product: ProductId,
-    /// `global`, a named region, a box WEST,SOUTH,EAST,NORTH, a GeoJSON or WKT file, the text of one,
-    /// or PRODUCT:CODE, the cells where a landed mask has a code.
-    #[arg(long, default_value = "global", allow_hyphen_values = true)]
-    pub(crate) region: String,
-    /// First instant: 2000, 2000-03, 2000-03-15 or with a time of day. The product's first if absent.
-    #[arg(long)]
-    pub(crate) from: Option<TimeMs>,
-    /// First instant after the period. The product's end if absent.
-    #[arg(long)]
-    pub(crate) to: Option<TimeMs>,
-    /// What a row of the answer covers: a calendar month, a calendar year, or the total of the period.
-    #[arg(long, default_value_t, value_name = "month|year|total")]
-    pub(crate) step: BudgetStep,
-    /// Figure of the earth for areas: wgs84, sphere (R = 6371 km) or local-radius (as FluxEngine sums).
-    #[arg(long, default_value = "wgs84")]
-    pub(crate) earth: Earth,
-    /// How cells on the coast count: whole, or by their ocean-share.
-    #[arg(long, default_value = "whole")]
-    pub(crate) cells: Cells,
-    /// Product that says how much of every cell is sea or land (`sea_area_fraction`, `land_area_fraction`), on the same grid.
-    /// Natural Earth's land, 1:50 million, if absent.
-    #[arg(long, value_name = "PRODUCT")]
-    pub(crate) ocean: Option<ProductId>,
     /// JSON instead of a table.
     #[arg(long)]
     pub(crate) json: bool,

@@ -9,7 +9,7 @@ use async_trait::async_trait;
 use bytes::Bytes;
 use compute::{ComputeError, Engine, ErrorClass};
 use contract::analysis::SeriesQuery;
-use contract::budget::{BudgetAnswer, BudgetQuery};
+use contract::budget::{BudgetAnswer, BudgetHistory, BudgetQuery};
 use contract::check::Check;
 use contract::encoding::Encoding;
 use contract::geometry::Geometry;
@@ -132,6 +132,11 @@ impl Analyse for Analyst {
         query: &BudgetQuery,
     ) -> Result<BudgetAnswer, BackendError> {
         let answer = compute::budget::budget_of(&self.regions, query, manifest);
+        answer.await.map_err(compute_failed)
+    }
+
+    async fn budget_history(&self, query: &BudgetQuery) -> Result<BudgetHistory, BackendError> {
+        let answer = compute::budget::history(&self.regions, query);
         answer.await.map_err(compute_failed)
     }
 

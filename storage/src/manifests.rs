@@ -1,6 +1,7 @@
 //! Numbered manifests: the newest of a product, one by its name, and the commit of the next.
 
 mod pages;
+mod published;
 
 use std::collections::BTreeSet;
 
@@ -14,6 +15,8 @@ use contract::product::ProductId;
 
 use crate::sound::damage;
 use crate::{StorageError, Store, document, fields};
+
+pub use published::{AtInstant, as_of, published};
 
 /// Products that have a manifest, sorted by name.
 pub async fn products(store: &Store) -> Result<Vec<ProductId>, StorageError> {
@@ -52,11 +55,13 @@ pub async fn numbers(store: &Store, product: &ProductId) -> Result<Vec<u64>, Sto
     let keys = store
         .list(&format!("{}/{product}", Kind::Manifest.folder()))
         .await?;
-    let number = |key: &ObjectKey| {
-        let name = key.as_str().rsplit('/').next()?;
-        name.strip_suffix(".json")?.parse().ok()
-    };
-    Ok(keys.iter().filter_map(number).collect())
+    Ok(keys.iter().filter_map(number_of).collect())
+}
+
+/// The number that the key of a manifest ends in.
+fn number_of(key: &ObjectKey) -> Option<u64> {
+    let name = key.as_str().rsplit('/').next()?;
+    name.strip_suffix(".json")?.parse().ok()
 }
 
 /// The manifest of a product with a number; none if there is none (any more).

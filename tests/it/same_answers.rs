@@ -53,6 +53,8 @@ fn lines(data: &Path, words: &str) -> Vec<Value> {
 fn a_question_on_the_command_line_and_over_http_has_one_answer() {
     let folder = landed();
     let data = folder.path();
+    let fifth = "derive --name flux-error --quantity carbon_flux --input f=flux --expr abs(f)*0.2";
+    program::succeed(data, &fifth.split(' ').collect::<Vec<_>>()).unwrap();
     let server = Server::start(data, &["serve"]).unwrap();
     let polygon = r#"{"type":"Polygon","coordinates":[[[0.5,0],[40,0],[20,33],[0.5,0]]]}"#;
     let drawn = (
@@ -113,6 +115,99 @@ fn a_question_on_the_command_line_and_over_http_has_one_answer() {
         assert_eq!(served.json().unwrap(), printed, "{path}");
     }
     made_of_series(data, &server);
+    besides(data, &server);
+}
+
+/// The same of what is asked of a budget besides a region: errors, rivers, parts, versions.
+fn besides(data: &Path, server: &Server) {
+    let parts = r#"{"type":"FeatureCollection","features":[{"type":"Feature","properties":{"name":"a"},"geometry":{"type":"Polygon","coordinates":[[[0,0],[40,0],[20,33],[0,0]]]}},{"type":"Feature","properties":{"name":"b"},"geometry":{"type":"Polygon","coordinates":[[[30,0],[60,0],[60,33],[30,0]]]}}]}"#;
+    let in_parts = (
+        format!("--step month --regions {parts} --error 10% --correlation-length-km 500"),
+        format!(
+            "budget?step=month&regions={}&error=10%25&correlation_length_km=500",
+            escaped(parts)
+        ),
+    );
+    for (words, path) in [
+        (
+            "--region 14n-50n --step month --error 20% --correlation-length-km 700 --correlation-days 45",
+            "budget?region=14n-50n&step=month&error=20%25&correlation_length_km=700&correlation_days=45",
+        ),
+        (
+            "--error flux-error --correlation-length-km 0 --cells ocean-share",
+            "budget?error=flux-error&correlation_length_km=0&cells=ocean-share",
+        ),
+        (
+            "--region 0,0,60,40 --error 30% --correlation-length-km 3000 --monte-carlo 20 --seed 7",
+            "budget?region=0,0,60,40&error=30%25&correlation_length_km=3000&monte_carlo=20&seed=7",
+        ),
+        (
+            "--step year --river-flux 650±300 --river-source somebody",
+            "budget?step=year&river_flux=650%C2%B1300&river_source=somebody",
+        ),
+        ("--river-flux flux", "budget?river_flux=flux"),
+        (&in_parts.0, &in_parts.1),
+        ("--as-of 2100", "budget?as_of=2100"),
+        (
+            "--history --region 14n-50n --error 20% --correlation-length-km 700",
+            "budget/history?region=14n-50n&error=20%25&correlation_length_km=700",
+        ),
+    ] {
+        let words = ["budget", "--product", "flux"]
+            .into_iter()
+            .chain(words.split_whitespace());
+        let words: Vec<&str> = words.chain(["--json"]).collect();
+        let printed = program::json(data, &words).unwrap();
+        let served = server.get(&format!("/api/products/flux/{path}")).unwrap();
+        assert_eq!(served.status, 200, "{path}: {}", served.text());
+        assert_eq!(served.json().unwrap(), printed, "{path}");
+    }
+    refused_alike(data, server);
+}
+
+/// What cannot be asked is refused on both sides, and says why.
+fn refused_alike(data: &Path, server: &Server) {
+    for (words, path, wanted) in [
+        ("--error 20%", "budget?error=20%25", "correlation length"),
+        (
+            "--error 20% --correlation-length-km -5",
+            "budget?error=20%25&correlation_length_km=-5",
+            "0 to 1000000 km",
+        ),
+        (
+            "--error flux-accumulated --correlation-length-km 5",
+            "budget?error=flux-accumulated&correlation_length_km=5",
+            "its unit",
+        ),
+        (
+            "--as-of 1999",
+            "budget?as_of=1999",
+            "the first version of flux that is kept",
+        ),
+        ("--as-of yesterday", "budget?as_of=yesterday", "an instant"),
+        ("--river-flux 650", "budget?river_flux=650", "river source"),
+        (
+            "--history --step month",
+            "budget/history?step=month",
+            "one number",
+        ),
+        ("--regions {}", "budget?regions=%7B%7D", "GeoJSON"),
+        (
+            "--error 1% --correlation-length-km 9 --monte-carlo 99999",
+            "budget?error=1%25&correlation_length_km=9&monte_carlo=99999",
+            "10 to 10000 draws",
+        ),
+    ] {
+        let words = ["budget", "--product", "flux"]
+            .into_iter()
+            .chain(words.split_whitespace());
+        let words: Vec<&str> = words.collect();
+        let refused = program::fail(data, &words).unwrap();
+        assert!(refused.contains(wanted), "{words:?}: {refused}");
+        let served = server.get(&format!("/api/products/flux/{path}")).unwrap();
+        assert_eq!(served.status, 400, "{path}: {}", served.text());
+        assert!(served.text().contains(wanted), "{path}: {}", served.text());
+    }
 }
 
 /// The same of climatologies, correlations, differences and bands.

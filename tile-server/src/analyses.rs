@@ -6,7 +6,9 @@ mod of_series;
 use std::future::Future;
 use std::sync::Arc;
 
-use contract::budget::{BudgetAnswer, BudgetQuery};
+use contract::budget::{
+    AskedRiver, BudgetAnswer, BudgetErrors, BudgetHistory, BudgetParts, BudgetQuery,
+};
 use contract::check::Check;
 use contract::digest::Digest;
 use contract::grid::LonLatDeg;
@@ -22,8 +24,12 @@ use crate::gate::Gate;
 use crate::metrics::Metrics;
 use crate::single_flight::SingleFlight;
 
-/// Budgets remembered; one of 16 years by month takes 34 KiB.
+/// Budgets remembered, a guess that sizes tables; one of 16 years by month takes 34 KiB.
 const BUDGETS: usize = 1000;
+/// Rows and regions in all of them, some 500 bytes each.
+const BUDGET_ROWS: u64 = 1 << 17;
+/// Histories of budgets remembered; one of 200 versions takes 60 KiB.
+const HISTORIES: usize = 100;
 /// Series over regions remembered; one of 16 years of days takes 320 KiB.
 const AREAS: usize = 100;
 /// What is made of series and remembered; a Hovmöller diagram takes 8 MiB at most.
@@ -41,12 +47,36 @@ fn numbers(answer: &StatisticsAnswer) -> u64 {
     answer.rows.len() as u64 * a_row + 1
 }
 
+/// Rows of an answer, those of its regions too.
+fn budget_rows(answer: &BudgetAnswer) -> u64 {
+    let of_regions = answer
+        .regions
+        .iter()
+        .map(|region| region.rows.len() as u64 + 1);
+    answer.rows.len() as u64 + of_regions.sum::<u64>() + 1
+}
+
+/// All that shapes a budget of a version.
+fn budget_key(layer: &Layer, query: &BudgetQuery) -> Digest {
+    Digest::of_json(&(
+        &layer.id,
+        (&query.region, &query.region_name),
+        (query.from, query.to, query.step),
+        (query.earth, query.cells),
+        query.ocean.as_ref().map(|ocean| ocean.id()),
+        query.errors.as_ref().map(BudgetErrors::key),
+        query.river.as_ref().map(AskedRiver::key),
+        query.parts.as_ref().map(BudgetParts::key),
+    ))
+}
+
 /// The analyses of one server.
 pub struct Analyses {
     analyst: Arc<dyn Analyse>,
     gate: Gate,
     metrics: Metrics,
     budgets: Answers<BudgetAnswer>,
+    histories: Answers<BudgetHistory>,
     areas: Answers<RegionSeries>,
     statistics: Answers<StatisticsAnswer>,
     made_of_series: Answers<MadeOfSeries>,
@@ -114,7 +144,8 @@ impl Analyses {
             analyst,
             gate,
             metrics,
-            budgets: Answers::new(BUDGETS, BUDGETS as u64, |_one| 1),
+            budgets: Answers::new(BUDGETS, BUDGET_ROWS, budget_rows),
+            histories: Answers::new(HISTORIES, HISTORIES as u64, |_one| 1),
             areas: Answers::new(AREAS, AREAS as u64, |_one| 1),
             statistics: Answers::new(STATISTICS, STATISTICS_NUMBERS, numbers),
             made_of_series: Answers::new(MADE_OF_SERIES, MADE_OF_SERIES as u64, |_one| 1),
@@ -145,16 +176,24 @@ impl Analyses {
         layer: &Layer,
         query: BudgetQuery,
     ) -> Result<Arc<BudgetAnswer>, ServerError> {
-        let key = Digest::of_json(&(
-            &layer.id,
-            (&query.region, &query.region_name),
-            (query.from, query.to, query.step),
-            (query.earth, query.cells),
-            query.ocean.as_ref().map(|ocean| ocean.id()),
-        ));
+        let key = budget_key(layer, &query);
         let (analyst, manifest) = (Arc::clone(&self.analyst), Arc::clone(&layer.manifest));
         let computed = async move { analyst.budget(&manifest, &query).await };
         self.budgets
+            .answer(key, &self.gate, &self.metrics, computed)
+            .await
+    }
+
+    /// A budget by the versions of the product of which `layer` is the newest.
+    pub async fn budget_history(
+        &self,
+        layer: &Layer,
+        query: BudgetQuery,
+    ) -> Result<Arc<BudgetHistory>, ServerError> {
+        let key = budget_key(layer, &query);
+        let analyst = Arc::clone(&self.analyst);
+        let computed = async move { analyst.budget_history(&query).await };
+        self.histories
             .answer(key, &self.gate, &self.metrics, computed)
             .await
     }

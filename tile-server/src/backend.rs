@@ -13,7 +13,7 @@ use contract::analysis::{
     AnalysisOptions, Correlation, CorrelationQuery, Difference, Hovmoller, HovmollerQuery,
     SeriesAnalysis, SeriesQuery,
 };
-use contract::budget::{BudgetAnswer, BudgetQuery};
+use contract::budget::{BudgetAnswer, BudgetHistory, BudgetQuery};
 use contract::check::Check;
 use contract::encoding::Encoding;
 use contract::grid::LonLatDeg;
@@ -150,6 +150,9 @@ pub trait Analyse: Send + Sync + 'static {
         manifest: &Manifest,
         query: &BudgetQuery,
     ) -> Result<BudgetAnswer, BackendError>;
+
+    /// The same by every version of the product that changed it.
+    async fn budget_history(&self, query: &BudgetQuery) -> Result<BudgetHistory, BackendError>;
 
     /// The mean of a version of a product over a region, one for each step in the period.
     async fn area(

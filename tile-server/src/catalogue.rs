@@ -7,12 +7,14 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
+use contract::budget::AsOf;
 use contract::flow::check_parts;
 use contract::manifest::ManifestId;
 use contract::product::ProductId;
 use contract::quantity::Quantity;
 use futures::FutureExt as _;
 use futures::future::{BoxFuture, Shared};
+use storage::manifests::{self, AtInstant};
 use storage::{StorageError, Store};
 
 use crate::error::ServerError;
@@ -116,6 +118,36 @@ impl Catalogue {
         }
         let older = self.reader.versions.layer(&id).await?;
         Ok(drifting(older, newest.northward.as_ref()))
+    }
+
+    /// The version of a product as of a name or an instant.
+    ///
+    /// # Errors
+    /// The first one that is kept is younger.
+    pub(crate) async fn as_of(
+        &self,
+        product: &str,
+        as_of: &AsOf,
+    ) -> Result<Arc<Layer>, ServerError> {
+        let instant = match as_of {
+            AsOf::Version(id) => return self.version(product, Some(&id.to_string())).await,
+            AsOf::Instant(instant) => *instant,
+        };
+        let newest = self.layer(product).await?;
+        let product_id = &newest.manifest.product;
+        let unknown = || ServerError::EmptyProduct {
+            name: product_id.to_string(),
+        };
+        match manifests::as_of(&self.reader.store, product_id, instant).await? {
+            AtInstant::Version(manifest) => {
+                self.version(product, Some(&manifest.id().to_string()))
+                    .await
+            }
+            AtInstant::BeforeFirst(first) => {
+                Err(AsOf::before_first(product_id, instant, first).into())
+            }
+            AtInstant::Nothing => Err(unknown()),
+        }
     }
 
     /// Is a layer still what the name of its product means?

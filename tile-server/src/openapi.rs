@@ -52,6 +52,7 @@ const RETRY_AFTER: &str = "Seconds after which the same request may succeed";
         difference::get,
         hovmoller::get,
         budget::get,
+        budget::history,
         check::get,
         zarr::get,
         platforms::get,

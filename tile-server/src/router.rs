@@ -73,6 +73,10 @@ pub fn router(state: AppState) -> Router {
         .route("/api/products/{product}/difference", get(difference::get))
         .route("/api/products/{product}/hovmoller", get(hovmoller::get))
         .route("/api/products/{product}/budget", get(budget::get))
+        .route(
+            "/api/products/{product}/budget/history",
+            get(budget::history),
+        )
         .route("/api/products/{product}/{legend_file}", get(legend::get))
         .route("/api/regions", get(regions::list))
         .route("/api/palettes", get(palettes::list))

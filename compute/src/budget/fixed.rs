@@ -33,6 +33,12 @@ pub fn to_steps(steps: f64) -> Result<i128, OutOfRange> {
     }
 }
 
+/// What of a value lies from `start` to `end` of its `whole` time: shares of parts that follow each other sum to the whole, to the
+/// bit. None if a product leaves an `i128`.
+pub fn share_between(value: i128, start: i64, end: i64, whole: i64) -> Option<i128> {
+    share(value, end, whole)?.checked_sub(share(value, start, whole)?)
+}
+
 /// `value * part / whole` to the nearest integer, halves away from zero; none if the product leaves an `i128`.
 pub fn share(value: i128, part: i64, whole: i64) -> Option<i128> {
     if part == whole {
@@ -51,9 +57,28 @@ pub fn decimal_text(value: i128, decimals: u32) -> String {
     format!("{sign}{whole}.{rest:0width$}", width = decimals as usize)
 }
 
+/// The integer of such a text; none of any other.
+pub fn steps_of_text(text: &str, decimals: u32) -> Option<i128> {
+    let (whole, rest) = text.split_once('.')?;
+    if rest.len() != decimals as usize || !rest.bytes().all(|b| b.is_ascii_digit()) {
+        return None;
+    }
+    format!("{whole}{rest}").parse().ok()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn text_is_read_as_it_is_written() {
+        for value in [0, 7, -5, 1_000_000_001, i128::MIN + 1, i128::MAX] {
+            assert_eq!(steps_of_text(&decimal_text(value, 9), 9), Some(value));
+        }
+        for bad in ["", "1", "1.5", "1.12345678a", "x.123456789", "1.+23456789"] {
+            assert_eq!(steps_of_text(bad, 9), None, "{bad}");
+        }
+    }
 
     #[test]
     fn steps_round_to_the_nearest_and_refuse_nonsense() {
@@ -96,6 +121,17 @@ mod tests {
         assert_eq!(share(-20, 1, 3), Some(-7));
         assert_eq!(share(i128::MAX, 5, 5), Some(i128::MAX));
         assert_eq!(share(i128::MAX, 2, 3), None);
+    }
+
+    #[test]
+    fn parts_that_follow_each_other_sum_to_the_whole() {
+        for value in [1, -1, 5, 10, -20, 1_234_567_890_123] {
+            let cuts = [0, 1, 2, 5, 6, 7];
+            let parts = cuts
+                .windows(2)
+                .map(|cut| share_between(value, cut[0], cut[1], 7).unwrap());
+            assert_eq!(parts.sum::<i128>(), value);
+        }
     }
 
     #[test]

@@ -1,6 +1,6 @@
-//! A budget: a region's weights, exact sums of every step, calendar rows.
+//! A budget: a region's weights, exact sums of every step, calendar rows; with what was asked about them besides.
 
-use contract::budget::{BudgetAnswer, BudgetQuery};
+use contract::budget::{BudgetAnswer, BudgetQuery, BudgetStep};
 use contract::manifest::{Manifest, Step};
 use contract::quantity::Quantity;
 use contract::time::Period;
@@ -10,7 +10,10 @@ use super::accumulated;
 use super::gaps::BASIS;
 use super::measure::Measure;
 use super::over_region::{AskedArea, over_region};
+use super::parts;
+use super::river;
 use super::rows::{Asked, row_periods, rows};
+use super::uncertainty;
 use crate::{ComputeError, Engine, catalogue};
 
 /// Computes a budget.
@@ -22,6 +25,24 @@ pub async fn budget(engine: &Engine, query: &BudgetQuery) -> Result<BudgetAnswer
 /// Computes a budget of one version of a product. That of accumulated carbon is that of the flux which it was accumulated
 /// from, from where accumulation starts on.
 pub async fn budget_of(
+    engine: &Engine,
+    query: &BudgetQuery,
+    manifest: &Manifest,
+) -> Result<BudgetAnswer, ComputeError> {
+    let mut answer = of_region(engine, query, manifest).await?;
+    if let Some(asked) = &query.river {
+        let river = river::River::of(engine, query, asked, &answer.rows).await?;
+        river.take_off(&mut answer.rows);
+        answer.river = Some(river.basis);
+    }
+    if let Some(asked) = &query.parts {
+        parts::add(engine, query, manifest, asked, &mut answer).await?;
+    }
+    Ok(answer)
+}
+
+/// The budget of one region, without what is held against it.
+pub(super) async fn of_region(
     engine: &Engine,
     query: &BudgetQuery,
     manifest: &Manifest,
@@ -57,9 +78,25 @@ async fn of_flux(
         sea_steps: sums.sea_steps,
         cells: query.cells,
     };
-    let rows = rows(&row_periods(window, query.step)?, &sums.steps, &asked).ok_or_else(|| {
-        ComputeError::inconsistent(manifest.id().to_string(), "its sums exceed 128 bits")
-    })?;
+    let too_large =
+        || ComputeError::inconsistent(manifest.id().to_string(), "its sums exceed 128 bits");
+    let rows_of = |periods: &[Period]| rows(periods, &sums.steps, &asked).ok_or_else(too_large);
+    let mut rows = rows_of(&row_periods(window, query.step)?)?;
+    let closure = match query.step {
+        BudgetStep::Total => None,
+        BudgetStep::Month | BudgetStep::Year => {
+            Some(parts::of_time(&rows, &rows_of(&[window])?).ok_or_else(too_large)?)
+        }
+    };
+    let mut basis = None;
+    if let Some(errors) = &query.errors {
+        let flux = (manifest, steps);
+        let uncertain = uncertainty::of_rows(engine, query, errors, flux, &rows).await?;
+        for (row, own) in rows.iter_mut().zip(uncertain.rows) {
+            row.uncertainty = Some(own);
+        }
+        basis = Some(uncertain.basis);
+    }
     Ok(BudgetAnswer {
         product: manifest.product.clone(),
         manifest: manifest.id(),
@@ -75,6 +112,10 @@ async fn of_flux(
         ocean_area_m2: extent.ocean_m2,
         gap_basis: BASIS.to_owned(),
         notes: extent.notes,
+        uncertainty: basis,
+        river: None,
         rows,
+        regions: vec![],
+        closure,
     })
 }

@@ -3,10 +3,10 @@
 use contract::ContractError;
 use contract::budget::{BudgetRow, BudgetStep};
 use contract::region::Cells;
-use contract::time::Period;
+use contract::time::{Period, TimeMs};
 
 use super::bands::{BAND_COUNT, BandSum};
-use super::fixed::{AREA_DECIMALS, MASS_DECIMALS, decimal_text, share};
+use super::fixed::{AREA_DECIMALS, MASS_DECIMALS, decimal_text, share_between};
 use super::gaps::gap;
 
 /// Exact sums of one step over a region.
@@ -81,7 +81,7 @@ pub fn row_periods(window: Period, step: BudgetStep) -> Result<Vec<Period>, Cont
 
 /// One row of each period that some step reaches into.
 ///
-/// A step that lies partly inside counts by the share of its time. None if a sum leaves 128 bits.
+/// A step that lies partly inside counts by the share of its time; rows that follow each other share it out exactly. None if a sum leaves 128 bits.
 pub fn rows(periods: &[Period], sums: &[StepSum], asked: &Asked) -> Option<Vec<BudgetRow>> {
     let mut rows = vec![];
     for &period in periods {
@@ -121,9 +121,9 @@ impl Total {
         let inside_ms = end.ms() - start.ms();
         let whole_ms = sum.period.end.ms() - sum.period.start.ms();
         let (mass_steps, area_steps) = sum.counted(asked.cells);
-        self.mass_steps = self
-            .mass_steps
-            .checked_add(share(mass_steps, inside_ms, whole_ms)?)?;
+        let since_ms = |time: TimeMs| time.ms() - sum.period.start.ms();
+        let inside = share_between(mass_steps, since_ms(start), since_ms(end), whole_ms)?;
+        self.mass_steps = self.mass_steps.checked_add(inside)?;
         let of_time = |steps: i128| steps.checked_mul(i128::from(inside_ms));
         self.area_time = self.area_time.checked_add(of_time(area_steps)?)?;
         self.sea_time = self.sea_time.checked_add(of_time(sum.sea_area_steps())?)?;
@@ -155,6 +155,8 @@ impl Total {
             gap_tg: (!has_gaps || self.gap_time_m2_ms > 0.0).then_some(self.gap_kg / KG_PER_TG),
             gap_area_m2: self.gap_time_m2_ms / covered_ms,
             completeness: None,
+            uncertainty: None,
+            river: None,
         }
     }
 }

@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use contract::grid::Grid;
 use contract::manifest::Manifest;
 use contract::product::ProductId;
-use contract::region::{AskedRegion, MAX_CORNERS, Polygon, Region};
+use contract::region::{AskedRegion, MAX_CORNERS, MAX_REGIONS, Polygon, Region};
 use storage::Store;
 
 use crate::ComputeError;
@@ -30,21 +30,66 @@ pub async fn region(
     mask: &Manifest,
     code: f32,
 ) -> Result<AskedRegion, ComputeError> {
+    let values = map(store, mask).await?;
+    of_code(mask, &values, code)
+}
+
+/// The same of every code of a mask, in the order of codes.
+///
+/// # Errors
+/// As of one, and more codes than regions are asked for at once.
+pub async fn regions(store: &Store, mask: &Manifest) -> Result<Vec<AskedRegion>, ComputeError> {
+    let values = map(store, mask).await?;
+    let mut codes: Vec<f32> = vec![];
+    for value in values.iter().filter(|value| !value.is_nan()) {
+        if let Err(at) = codes.binary_search_by(|code| code.total_cmp(value)) {
+            codes.insert(at, *value);
+        }
+        if codes.len() > MAX_REGIONS {
+            return Err(refused(
+                mask,
+                &format!("it has more than {MAX_REGIONS} codes"),
+            ));
+        }
+    }
+    if codes.is_empty() {
+        return Err(refused(mask, "no cell has a code"));
+    }
+    codes
+        .iter()
+        .map(|code| of_code(mask, &values, *code))
+        .collect()
+}
+
+/// The one map of a mask, `[row, col]`.
+async fn map(store: &Store, mask: &Manifest) -> Result<Vec<f32>, ComputeError> {
+    let [step] = &mask.steps[..] else {
+        let count = mask.steps.len();
+        return Err(refused(
+            mask,
+            &format!("the product has {count} steps; a mask is one map"),
+        ));
+    };
+    Ok(storage::fields::read(store, &step.field, &mask.grid).await?)
+}
+
+fn refused(mask: &Manifest, reason: &str) -> ComputeError {
+    ComputeError::Region {
+        reason: format!("{}: {reason}", mask.product),
+    }
+}
+
+fn of_code(mask: &Manifest, values: &[f32], code: f32) -> Result<AskedRegion, ComputeError> {
     let refused = |reason: String| {
         Err(ComputeError::Region {
             reason: format!("{}:{code}: {reason}", mask.product),
         })
     };
-    let [step] = &mask.steps[..] else {
-        let count = mask.steps.len();
-        return refused(format!("the product has {count} steps; a mask is one map"));
-    };
-    let values = storage::fields::read(store, &step.field, &mask.grid).await?;
-    let rectangles = rectangles(&mask.grid, &values, code);
+    let rectangles = rectangles(&mask.grid, values, code);
     if rectangles.is_empty() {
         return refused(format!(
             "no cell has this code; there are {}",
-            codes(&values)
+            codes(values)
         ));
     }
     if rectangles.len() * 4 > MAX_CORNERS {

@@ -63,9 +63,9 @@ impl Shares {
         if !are_same_cells(&ocean.grid, &summed.grid) {
             return refused(format!(
                 "its grid is {}, that of {} is {}; give shares on the grid of what is summed",
-                text(&ocean.grid),
+                grid_text(&ocean.grid),
                 summed.product,
-                text(&summed.grid)
+                grid_text(&summed.grid)
             ));
         }
         Ok(Self {
@@ -122,7 +122,8 @@ pub(crate) fn source(ocean: Option<&Manifest>) -> String {
     format!("{}, {what}: {}", manifest.id(), manifest.title)
 }
 
-fn are_same_cells(a: &Grid, b: &Grid) -> bool {
+/// Are two grids the same but for the rounding of their axes?
+pub(crate) fn are_same_cells(a: &Grid, b: &Grid) -> bool {
     let apart = |a: f64, b: f64, cell: f64| (a - b).abs() < SLACK_CELLS * cell;
     let turned = |west: f64| (west - b.west_deg + 180.0).rem_euclid(360.0) - 180.0;
     (a.rows, a.cols) == (b.rows, b.cols)
@@ -136,7 +137,8 @@ fn are_same_cells(a: &Grid, b: &Grid) -> bool {
         )
 }
 
-fn text(grid: &Grid) -> String {
+/// A grid in words.
+pub(crate) fn grid_text(grid: &Grid) -> String {
     let [west, south, east, north] = grid.bounds_deg();
     format!(
         "{} x {} cells from {west} to {east} degrees east and {south} to {north} degrees north",

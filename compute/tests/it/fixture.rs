@@ -131,6 +131,9 @@ pub(crate) fn total(id: &ProductId, region: &str) -> BudgetQuery {
         earth: Earth::Wgs84,
         cells: Cells::Whole,
         ocean: None,
+        errors: None,
+        river: None,
+        parts: None,
     }
 }
 

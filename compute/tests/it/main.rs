@@ -9,6 +9,8 @@ mod budgets;
 #[cfg(test)]
 mod cleaned;
 #[cfg(test)]
+mod closure;
+#[cfg(test)]
 mod cluster;
 #[cfg(test)]
 mod co2_flux;
@@ -22,6 +24,8 @@ mod fixture;
 mod fluxengine;
 #[cfg(test)]
 mod frozen;
+#[cfg(test)]
+mod history;
 #[cfg(test)]
 mod incremental;
 #[cfg(test)]
@@ -50,3 +54,5 @@ mod takahashi;
 mod told;
 #[cfg(test)]
 mod troubled;
+#[cfg(test)]
+mod uncertainty;

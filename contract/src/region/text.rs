@@ -45,7 +45,7 @@ pub(super) fn polygons(text: &str) -> Option<Result<Vec<Polygon>, ContractError>
     Some(checked.map_err(|reason| ContractError::invalid("region", text, reason)))
 }
 
-fn within_limit(text: &str) -> Result<&str, String> {
+pub(super) fn within_limit(text: &str) -> Result<&str, String> {
     if text.len() > MAX_TEXT_BYTES {
         let bytes = text.len();
         return Err(format!(
@@ -55,7 +55,7 @@ fn within_limit(text: &str) -> Result<&str, String> {
     Ok(text)
 }
 
-fn checked(polygons: Vec<Polygon>) -> Result<Vec<Polygon>, String> {
+pub(super) fn checked(polygons: Vec<Polygon>) -> Result<Vec<Polygon>, String> {
     if polygons.is_empty() {
         return Err("it holds no Polygon or MultiPolygon".to_owned());
     }
@@ -89,13 +89,17 @@ fn geojson_polygons(text: &str) -> Result<Vec<Polygon>, String> {
     Ok(polygons)
 }
 
-fn first_line(error: &dyn std::fmt::Display) -> String {
+pub(super) fn first_line(error: &dyn std::fmt::Display) -> String {
     let text = error.to_string();
     let line = text.lines().next().unwrap_or_default();
     line.chars().take(200).collect()
 }
 
-fn collect(geometry: &Geometry, depth: usize, polygons: &mut Vec<Polygon>) -> Result<(), String> {
+pub(super) fn collect(
+    geometry: &Geometry,
+    depth: usize,
+    polygons: &mut Vec<Polygon>,
+) -> Result<(), String> {
     match &geometry.value {
         GeometryValue::Polygon { coordinates } => polygons.push(geojson_polygon(coordinates)?),
         GeometryValue::MultiPolygon { coordinates } => {

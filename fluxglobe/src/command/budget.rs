@@ -1,18 +1,20 @@
 //! `fluxglobe budget`: a product, a region and a period in; a table or JSON of Tg C with its coverage and source out.
 
+mod tables;
+
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
-use anyhow::Result;
-use comfy_table::presets::NOTHING;
-use comfy_table::{CellAlignment, Table};
+use anyhow::{Result, bail};
 use compute::region::{file, mask};
-use contract::budget::{BudgetAnswer, BudgetQuery, BudgetRow};
+use contract::budget::{AsOf, BudgetAnswer, BudgetHistory, BudgetQuery, BudgetRow};
 use contract::manifest::Manifest;
 use contract::product::ProductId;
 use contract::quantity::Quantity;
 use contract::region::AskedRegion;
 use storage::Store;
+use storage::manifests::{self, AtInstant};
 
 use crate::cli::{Budget, Settings};
 use crate::{deployment, progress};
@@ -21,27 +23,80 @@ const M2_PER_MILLION_KM2: f64 = 1e12;
 
 pub(crate) async fn run(settings: &Settings, options: &Budget) -> Result<()> {
     let store = deployment::store(settings)?;
-    let product = deployment::manifest(&store, &options.product, &settings.data).await?;
+    let product = version(settings, &store, options).await?;
+    let query = query(settings, &store, options).await?;
+    let bar = progress::bar("sum over the region", 1);
+    let engine = deployment::region_engine(settings, store)?;
+    if options.history {
+        let answer = compute::budget::history(&engine, &query).await?;
+        bar.finish_and_clear();
+        return say_history(options, &answer);
+    }
+    let answer = compute::budget::budget_of(&engine, &query, &product).await?;
+    bar.finish_and_clear();
+    if options.json {
+        return progress::result(&serde_json::to_string_pretty(&answer)?);
+    }
+    progress::result(&tables::of(&answer).to_string())?;
+    say_what(&answer);
+    say_besides(&answer);
+    let is_counted = |row: &BudgetRow| row.completeness.is_some();
+    if product.quantity == Quantity::AccumulatedCarbon && !answer.rows.iter().all(is_counted) {
+        progress::say(
+            "how complete its sums are is unknown: an older version accumulated it; `fluxglobe derive accumulated` does it anew",
+        );
+    }
+    progress::say(&answer.source);
+    Ok(())
+}
+
+/// The version that is asked for.
+async fn version(settings: &Settings, store: &Store, options: &Budget) -> Result<Manifest> {
+    let product = &options.product;
+    let newest = deployment::manifest(store, product, &settings.data).await?;
+    match &options.as_of {
+        None => Ok(newest),
+        Some(AsOf::Version(id)) if id.product != *product => {
+            bail!("version {id} is none of {product}")
+        }
+        Some(AsOf::Version(id)) => Ok(manifests::load(store, id).await?),
+        Some(AsOf::Instant(instant)) => match manifests::as_of(store, product, *instant).await? {
+            AtInstant::Version(manifest) => Ok(*manifest),
+            AtInstant::BeforeFirst(first) => {
+                Err(AsOf::before_first(product, *instant, first).into())
+            }
+            AtInstant::Nothing => bail!("{product} has no version"),
+        },
+    }
+}
+
+async fn query(settings: &Settings, store: &Store, options: &Budget) -> Result<BudgetQuery> {
+    let regions = match &options.regions {
+        Some(text) if file::is_file_name(text) => Some(file::text(Path::new(text))?),
+        text => text.clone(),
+    };
+    let besides = options.words(regions.as_deref()).asked()?;
+    let mut versions = BTreeMap::new();
+    for product in besides.products() {
+        let manifest = deployment::manifest(store, &product, &settings.data).await?;
+        versions.insert(product, Arc::new(manifest));
+    }
     let query = BudgetQuery {
         from: options.from,
         to: options.to,
         step: options.step,
         earth: options.earth,
         cells: options.cells,
-        ocean: ocean(settings, &store, options.ocean.as_ref()).await?,
+        ocean: ocean(settings, store, options.ocean.as_ref()).await?,
         ..BudgetQuery::new(
             options.product.clone(),
-            stored_region(settings, &store, &options.region).await?,
+            stored_region(settings, store, &options.region).await?,
         )
     };
-    let bar = progress::bar("sum over the region", 1);
-    let engine = deployment::region_engine(settings, store)?;
-    let answer = compute::budget::budget(&engine, &query).await?;
-    bar.finish_and_clear();
-    if options.json {
-        return progress::result(&serde_json::to_string_pretty(&answer)?);
-    }
-    progress::result(&table(&answer).to_string())?;
+    Ok(besides.of(query, &versions)?)
+}
+
+fn say_what(answer: &BudgetAnswer) {
     let million_km2 = |m2: f64| m2 / M2_PER_MILLION_KM2;
     progress::say(&format!(
         "{} of {}, {} earth, positive out of the sea; {} ({}); cite {}",
@@ -62,13 +117,70 @@ pub(crate) async fn run(settings: &Settings, options: &Budget) -> Result<()> {
     for note in &answer.notes {
         progress::say(&format!("note: {note}"));
     }
-    let is_counted = |row: &BudgetRow| row.completeness.is_some();
-    if product.quantity == Quantity::AccumulatedCarbon && !answer.rows.iter().all(is_counted) {
-        progress::say(
-            "how complete its sums are is unknown: an older version accumulated it; `fluxglobe derive accumulated` does it anew",
-        );
+    for region in &answer.regions {
+        for note in &region.notes {
+            progress::say(&format!("note on {}: {note}", region.region));
+        }
     }
-    progress::say(&answer.source);
+}
+
+/// What was asked besides: how uncertain it is, rivers, parts.
+fn say_besides(answer: &BudgetAnswer) {
+    if let Some(own) = &answer.uncertainty {
+        let version = own.manifest.as_ref().map(|id| format!(" ({id})"));
+        progress::say(&format!(
+            "± is one standard error, of {}{}; sum over {}",
+            own.error,
+            version.unwrap_or_default(),
+            own.scheme
+        ));
+        for assumption in &own.assumptions {
+            progress::say(&format!("assumed: {assumption}"));
+        }
+    }
+    if let Some(river) = &answer.river {
+        let version = river.manifest.as_ref().map(|id| format!(" ({id})"));
+        progress::say(&format!(
+            "river flux: {}{}; {}",
+            river.source,
+            version.unwrap_or_default(),
+            river.meaning
+        ));
+    }
+    if let Some(closure) = &answer.closure {
+        progress::say(&format!(
+            "closure: rows sum to {} kg, their period as one row is {} kg",
+            closure.rows_kg, closure.total_kg
+        ));
+        if let Some(own) = &closure.regions {
+            progress::say(&format!(
+                "closure: regions {} kg - counted twice {} kg + in none of them {} kg = {} {} kg; {}",
+                own.regions_kg,
+                own.overlap_kg,
+                own.left_out_kg,
+                answer.region,
+                own.whole_kg,
+                own.summary
+            ));
+        }
+    }
+}
+
+fn say_history(options: &Budget, answer: &BudgetHistory) -> Result<()> {
+    if options.json {
+        return progress::result(&serde_json::to_string_pretty(answer)?);
+    }
+    progress::result(&tables::of_history(answer).to_string())?;
+    progress::say(&format!(
+        "{} of {}, positive out of the sea, by the {} of {} versions that changed it",
+        answer.unit,
+        answer.region,
+        answer.versions.len(),
+        answer.version_count
+    ));
+    for note in &answer.notes {
+        progress::say(&format!("note: {note}"));
+    }
     Ok(())
 }
 
@@ -106,48 +218,4 @@ pub(crate) fn region(text: &str) -> Result<AskedRegion> {
     } else {
         Ok(text.parse()?)
     }
-}
-
-fn table(answer: &BudgetAnswer) -> Table {
-    let mut table = Table::new();
-    table.load_preset(NOTHING);
-    let is_counted = answer.rows.iter().any(|row| row.completeness.is_some());
-    let mut header = vec![
-        "from",
-        "to",
-        "Tg C",
-        "% of sea",
-        "10⁶ km² of sea with data",
-        "gaps would add Tg C",
-        "for 10⁶ km²",
-    ];
-    if is_counted {
-        header.extend(["10⁶ km² complete", "incomplete", "% complete"]);
-    }
-    table.set_header(header);
-    for column in 2..10 {
-        if let Some(column) = table.column_mut(column) {
-            column.set_cell_alignment(CellAlignment::Right);
-        }
-    }
-    for row in &answer.rows {
-        let mut cells = vec![
-            progress::day(row.start),
-            progress::day(row.end),
-            format!("{:.3}", row.budget_tg),
-            format!("{:.1}", row.coverage_percent),
-            format!("{:.3}", row.ocean_with_data_m2 / M2_PER_MILLION_KM2),
-            row.gap_tg
-                .map_or_else(|| "unknown".to_owned(), |gap_tg| format!("{gap_tg:.3}")),
-            format!("{:.3}", row.gap_area_m2 / M2_PER_MILLION_KM2),
-        ];
-        if let Some(completeness) = &row.completeness {
-            cells.push(format!("{:.3}", completeness.complete_m2 / 1e12));
-            cells.push(format!("{:.3}", completeness.incomplete_m2 / 1e12));
-            let percent = completeness.percent();
-            cells.push(percent.map_or("no data".to_owned(), |percent| format!("{percent:.1}")));
-        }
-        table.add_row(cells);
-    }
-    table
 }

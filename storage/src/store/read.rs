@@ -2,6 +2,7 @@
 
 use bytes::{Bytes, BytesMut};
 use contract::key::ObjectKey;
+use contract::time::TimeMs;
 use futures::{StreamExt as _, TryStreamExt as _, stream};
 use object_store::path::Path;
 use object_store::{Error, GetResultPayload, ObjectStoreExt as _};
@@ -109,6 +110,24 @@ impl Store {
             let name = meta.location.filename().unwrap_or_default();
             if !hdfs::is_half_written(name) {
                 keys.extend(meta.location.as_ref().parse::<ObjectKey>().ok());
+            }
+        }
+        keys.sort();
+        Ok(keys)
+    }
+
+    /// The same with when each was written, as the store says.
+    pub async fn list_written(
+        &self,
+        folder: &str,
+    ) -> Result<Vec<(ObjectKey, TimeMs)>, StorageError> {
+        let mut found = self.objects.list(Some(&Path::from(folder)));
+        let mut keys = vec![];
+        while let Some(meta) = found.try_next().await.map_err(|e| failed(folder, e))? {
+            let written = TimeMs::new(meta.last_modified.timestamp_millis());
+            let written = written.map_err(|e| StorageError::damaged(meta.location.as_ref(), e))?;
+            if let Ok(key) = meta.location.as_ref().parse() {
+                keys.push((key, written));
             }
         }
         keys.sort();

@@ -1,20 +1,25 @@
-//! `/api/products/{product}/budget`: the carbon a region gave off, by month, by year or in all.
+//! `/api/products/{product}/budget`: the carbon a region gave off, by month, by year or in all; `/history` below it: the same by
+//! the versions of the product.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use axum::Json;
 use axum::extract::State;
 use axum::http::header;
 use axum::response::{IntoResponse as _, Response};
-use contract::budget::{BudgetAnswer, BudgetQuery, BudgetStep};
+use contract::budget::{
+    AsOf, BudgetAnswer, BudgetHistory, BudgetQuery, BudgetStep, BudgetWords, ErrorWords,
+};
 use contract::earth::Earth;
 use contract::manifest::Manifest;
 use contract::region::Cells;
 use serde::Deserialize;
 use utoipa::IntoParams;
 
+use crate::catalogue::Layer;
 use crate::error::ServerError;
-use crate::extract::{UrlPath, UrlQuery, parsed, time};
+use crate::extract::{UrlPath, UrlQuery, number, parsed, time, whole_number};
 use crate::state::AppState;
 
 #[derive(Debug, Deserialize, IntoParams)]
@@ -41,6 +46,88 @@ pub(crate) struct BudgetParameters {
     ocean: Option<String>,
     /// Version, as answers name it; the newest unless one is given.
     manifest: Option<String>,
+    /// The newest version that was published at an instant (ISO 8601 UTC; a day is its first moment), or one by its name. In place
+    /// of `manifest`.
+    as_of: Option<String>,
+    /// Standard error of the flux: `20%`, a number with its unit such as `0.3 mol m-2 year-1`, or a product of standard errors on
+    /// the same grid. With it rows say how uncertain they are.
+    error: Option<String>,
+    /// How far errors of cells go together, km: exp(-d / length). 0 where the error of each cell is its own.
+    #[param(value_type = Option<f64>, minimum = 0)]
+    correlation_length_km: Option<String>,
+    /// How long errors of steps go together, days: exp(-t / days). 0, the error of each step is its own, unless given.
+    #[param(value_type = Option<f64>, minimum = 0)]
+    correlation_days: Option<String>,
+    /// Draws of a Monte Carlo, 10 to 10000: a check, and an interval that holds 95 % of the budgets.
+    #[param(value_type = Option<u32>, minimum = 10, maximum = 10000)]
+    monte_carlo: Option<String>,
+    /// The same seed draws the same errors; 0 unless given.
+    #[param(value_type = Option<u64>)]
+    seed: Option<String>,
+    /// Outgassing of river carbon that is taken off, Tg of carbon a year out of the sea, with its standard error if there is one
+    /// (`650` or `650±300`), or a product that is summed over the same region.
+    river_flux: Option<String>,
+    /// Where the number is from; needed with it.
+    river_source: Option<String>,
+    /// Parts of the region that are asked for by themselves too, and held against the whole: a GeoJSON `FeatureCollection` whose
+    /// features have names, or a product that is a mask, of which each code is a part.
+    regions: Option<String>,
+}
+
+impl BudgetParameters {
+    /// The question about a version.
+    async fn query(&self, state: &AppState, layer: &Layer) -> Result<BudgetQuery, ServerError> {
+        let region = self.region.as_deref().unwrap_or("global");
+        let query = BudgetQuery {
+            from: time(self.from.as_deref())?,
+            to: time(self.to.as_deref())?,
+            step: parsed(self.step.as_deref())?.unwrap_or_default(),
+            earth: parsed(self.earth.as_deref())?.unwrap_or_default(),
+            cells: parsed(self.cells.as_deref())?.unwrap_or_default(),
+            ocean: ocean(state, self.ocean.as_deref()).await?,
+            ..BudgetQuery::new(layer.manifest.product.clone(), region.parse()?)
+        };
+        let besides = self.words()?.asked()?;
+        let mut versions = BTreeMap::new();
+        for product in besides.products() {
+            let layer = state.catalogue.version(product.as_str(), None).await?;
+            versions.insert(product, Arc::clone(&layer.manifest));
+        }
+        Ok(besides.of(query, &versions)?)
+    }
+
+    fn words(&self) -> Result<BudgetWords<'_>, ServerError> {
+        let optional =
+            |what, text: Option<&str>, unit| text.map(|text| number(what, text, unit)).transpose();
+        let length = self.correlation_length_km.as_deref();
+        let days = self.correlation_days.as_deref();
+        let draws = self.monte_carlo.as_deref();
+        Ok(BudgetWords {
+            errors: ErrorWords {
+                error: self.error.as_deref(),
+                correlation_length_km: optional("correlation_length_km", length, "km")?,
+                correlation_days: optional("correlation_days", days, "days")?,
+                monte_carlo: draws
+                    .map(|text| whole_number("monte_carlo", text, DRAWS))
+                    .transpose()?,
+                seed: seed(self.seed.as_deref())?,
+            },
+            river_flux: self.river_flux.as_deref(),
+            river_source: self.river_source.as_deref(),
+            regions: self.regions.as_deref(),
+        })
+    }
+}
+
+const DRAWS: &str = "a number of draws, 10 to 10000";
+
+fn seed(text: Option<&str>) -> Result<Option<u64>, ServerError> {
+    let read = |text: &str| {
+        let digits = !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
+        let number = if digits { text.parse().ok() } else { None };
+        number.ok_or_else(|| ServerError::invalid("seed", text, "a whole number below 2^64"))
+    };
+    text.map(read).transpose()
 }
 
 /// The carbon budget of a region: by month, by year or in all, with its coverage and what gaps would add.
@@ -57,21 +144,45 @@ pub(crate) async fn get(
     UrlPath(product): UrlPath<String>,
     UrlQuery(asked): UrlQuery<BudgetParameters>,
 ) -> Result<Response, ServerError> {
-    let named = asked.manifest.as_deref();
-    let layer = state.catalogue.version(&product, named).await?;
-    let region = asked.region.as_deref().unwrap_or("global");
-    let query = BudgetQuery {
-        from: time(asked.from.as_deref())?,
-        to: time(asked.to.as_deref())?,
-        step: parsed(asked.step.as_deref())?.unwrap_or_default(),
-        earth: parsed(asked.earth.as_deref())?.unwrap_or_default(),
-        cells: parsed(asked.cells.as_deref())?.unwrap_or_default(),
-        ocean: ocean(&state, asked.ocean.as_deref()).await?,
-        ..BudgetQuery::new(layer.manifest.product.clone(), region.parse()?)
+    let as_of: Option<AsOf> = parsed(asked.as_of.as_deref())?;
+    let layer = match (&as_of, asked.manifest.as_deref()) {
+        (Some(_), Some(_)) => {
+            return Err(ServerError::Address {
+                reason: "manifest and as_of both say which version is meant: give one".to_owned(),
+            });
+        }
+        (Some(as_of), None) => state.catalogue.as_of(&product, as_of).await?,
+        (None, named) => state.catalogue.version(&product, named).await?,
     };
+    let query = asked.query(&state, &layer).await?;
     // What cannot be asked waits for no turn.
     query.steps(&layer.manifest)?;
     let answer = state.analyses.budget(&layer, query).await?;
+    Ok(([(header::CACHE_CONTROL, "no-cache")], Json(&*answer)).into_response())
+}
+
+/// One budget by every version of the product that changed it: what was known when, and what changed it.
+#[utoipa::path(
+    get,
+    path = "/api/products/{product}/budget/history",
+    operation_id = "budget_history",
+    tag = "statistics",
+    params(("product" = String, Path, description = "Name of a carbon flux or of accumulated carbon"), BudgetParameters),
+    responses((status = 200, description = "A line for each version that changed it", body = BudgetHistory)),
+)]
+pub(crate) async fn history(
+    State(state): State<AppState>,
+    UrlPath(product): UrlPath<String>,
+    UrlQuery(asked): UrlQuery<BudgetParameters>,
+) -> Result<Response, ServerError> {
+    if asked.manifest.is_some() || asked.as_of.is_some() {
+        return Err(ServerError::Address {
+            reason: "a history is of all versions: leave manifest and as_of out".to_owned(),
+        });
+    }
+    let layer = state.catalogue.version(&product, None).await?;
+    let query = asked.query(&state, &layer).await?;
+    let answer = state.analyses.budget_history(&layer, query).await?;
     Ok(([(header::CACHE_CONTROL, "no-cache")], Json(&*answer)).into_response())
 }
 

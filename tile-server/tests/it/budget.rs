@@ -1,7 +1,7 @@
 //! `/api/products/{product}/budget`.
 
 use axum::http::StatusCode;
-use contract::budget::{BudgetQuery, BudgetStep};
+use contract::budget::{BudgetParts, BudgetQuery, BudgetStep};
 use contract::earth::Earth;
 use contract::quantity::Quantity;
 use contract::region::{Cells, Region};
@@ -95,6 +95,73 @@ async fn a_product_may_say_what_is_sea_and_another_one_is_another_question() {
         (budgets.len(), app.analyst.areas.lock().unwrap().len()),
         (2, 2)
     );
+}
+
+#[tokio::test]
+async fn what_is_asked_besides_reaches_the_analyst_and_is_another_question() {
+    let app = TestApp::new().await;
+    app.land("mask", Quantity::LandAreaFraction, 1).await;
+    app.land("errors", Quantity::CarbonFlux, 1).await;
+    let questions = [
+        "",
+        "?error=20%25&correlation_length_km=700",
+        "?error=20%25&correlation_length_km=701",
+        "?error=20%25&correlation_length_km=700&correlation_days=5",
+        "?error=errors&correlation_length_km=700",
+        "?error=20%25&correlation_length_km=700&monte_carlo=10&seed=4",
+        "?error=20%25&correlation_length_km=700&monte_carlo=10&seed=5",
+        "?river_flux=650%C2%B1300&river_source=me",
+        "?river_flux=650&river_source=me",
+        "?river_flux=errors",
+        "?regions=mask",
+        "/history",
+    ];
+    for _twice in 0..2 {
+        for asked in questions {
+            let answer = app.get(&format!("/api/products/flux/budget{asked}")).await;
+            assert_eq!(answer.status, StatusCode::OK, "{asked}: {}", answer.text());
+        }
+    }
+    let budgets = app.analyst.budgets.lock().unwrap();
+    // Remembered apart, and once.
+    assert_eq!(budgets.len(), questions.len());
+    let errors = budgets[4].errors.as_ref().unwrap();
+    assert_eq!(
+        errors.of_product.as_ref().unwrap().product.as_str(),
+        "errors"
+    );
+    let draws = budgets[6].errors.as_ref().unwrap().monte_carlo.unwrap();
+    assert_eq!((draws.draws, draws.seed), (10, 5));
+    assert!(budgets[9].river.as_ref().unwrap().of_product.is_some());
+    assert!(matches!(budgets[10].parts, Some(BudgetParts::Mask(_))));
+}
+
+#[tokio::test]
+async fn what_is_asked_besides_and_makes_no_sense_is_refused() {
+    let app = TestApp::new().await;
+    for (asked, status, reason) in [
+        ("?error=20%25", 400, "correlation length"),
+        ("?error=20%25&correlation_length_km=nan", 400, "km"),
+        ("?error=20%25&correlation_length_km=7&seed=-1", 400, "2^64"),
+        (
+            "?error=20%25&correlation_length_km=7&monte_carlo=1e3",
+            400,
+            "10 to 10000",
+        ),
+        ("?error=nothing&correlation_length_km=7", 404, "no product"),
+        ("?as_of=1970", 400, "the first version of flux"),
+        ("?as_of=x", 400, "an instant"),
+        ("/history?as_of=2000", 400, "all versions"),
+        ("?regions=A+B", 400, "a mask"),
+    ] {
+        let answer = app.get(&format!("/api/products/flux/budget{asked}")).await;
+        assert_eq!(answer.status.as_u16(), status, "{asked}: {}", answer.text());
+        assert!(
+            answer.reason().contains(reason),
+            "{asked}: {}",
+            answer.reason()
+        );
+    }
 }
 
 #[tokio::test]

@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use async_trait::async_trait;
 use axum::body::Bytes;
-use contract::budget::{BudgetAnswer, BudgetQuery, BudgetRow, Completeness};
+use contract::budget::{BudgetAnswer, BudgetHistory, BudgetQuery, BudgetRow, Completeness};
 use contract::check::Check;
 use contract::encoding::Encoding;
 use contract::event::Event;
@@ -309,7 +309,13 @@ impl Analyse for Analyst {
             ocean_area_m2: 3.6e14,
             gap_basis: "the mean of the band".to_owned(),
             notes: vec!["taken as written".to_owned()],
+            uncertainty: None,
+            river: None,
+            regions: vec![],
+            closure: None,
             rows: vec![BudgetRow {
+                uncertainty: None,
+                river: None,
                 start: window.start,
                 end: window.end,
                 budget_kg: "-176100000000.000000000".to_owned(),
@@ -326,6 +332,20 @@ impl Analyse for Analyst {
                     incomplete_m2: 3e13,
                 }),
             }],
+        })
+    }
+
+    /// No version at all.
+    async fn budget_history(&self, query: &BudgetQuery) -> Result<BudgetHistory, BackendError> {
+        self.mood().apply()?;
+        self.budgets.lock().unwrap().push(query.clone());
+        Ok(BudgetHistory {
+            product: query.product.clone(),
+            region: query.region_name.clone(),
+            unit: "Tg C".to_owned(),
+            version_count: 0,
+            notes: vec![],
+            versions: vec![],
         })
     }
 

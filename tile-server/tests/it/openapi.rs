@@ -20,7 +20,7 @@ const COMMITTED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/openapi.json");
 const ROUTER: &str = include_str!("../../src/router.rs");
 
 /// One address of every operation, and what is sent along.
-const ASKED: [(&str, &str); 26] = [
+const ASKED: [(&str, &str); 27] = [
     (
         "/tiles/{product}/{mode}/{z}/{x}/{y}.png",
         "/tiles/flux/volume/1/0/1@2x.png",
@@ -75,6 +75,10 @@ const ASKED: [(&str, &str); 26] = [
     (
         "/api/products/{product}/budget",
         "/api/products/flux-accumulated/budget?step=year",
+    ),
+    (
+        "/api/products/{product}/budget/history",
+        "/api/products/flux/budget/history",
     ),
     ("/api/regions", "/api/regions"),
     ("/api/palettes", "/api/palettes"),

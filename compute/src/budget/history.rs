@@ -1,0 +1,182 @@
+//! One budget by every version that changed what it reads.
+
+use std::collections::BTreeMap;
+
+use contract::budget::{BudgetHistory, BudgetQuery, BudgetStep, VersionBudget};
+use contract::grid::Grid;
+use contract::key::ObjectKey;
+use contract::manifest::Manifest;
+use contract::quantity::Quantity;
+use contract::time::{Period, TimeMs};
+use storage::manifests;
+
+use super::query::budget_of;
+use crate::{ComputeError, Engine};
+
+/// Most versions that are looked at, the newest.
+const MOST_VERSIONS: usize = 2000;
+/// Most that are summed.
+const MOST_SUMMED: usize = 200;
+
+const NOTES: [&str; 2] = [
+    "a version is dated by when it was written to this store; one that was copied here, by the copy",
+    "a mask of land, errors and a river flux of a product are those of its newest version in all rows",
+];
+
+/// What of a version a question reads.
+#[derive(Debug, Clone, PartialEq)]
+struct Reads {
+    grid: Grid,
+    quantity: Quantity,
+    steps: BTreeMap<Period, ObjectKey>,
+}
+
+impl Reads {
+    /// Of accumulated carbon that is the flux which it was accumulated from.
+    async fn of(
+        engine: &Engine,
+        query: &BudgetQuery,
+        manifest: &Manifest,
+    ) -> Result<Self, ComputeError> {
+        let source;
+        let manifest = match &manifest.derived_from {
+            Some(id) if manifest.quantity == Quantity::AccumulatedCarbon => {
+                source = manifests::load(engine.store(), id).await?;
+                &source
+            }
+            _ => manifest,
+        };
+        let is_inside = |period: Period| {
+            query.from.is_none_or(|from| period.end > from)
+                && query.to.is_none_or(|to| period.start < to)
+        };
+        let steps = manifest.steps.iter().filter(|step| is_inside(step.period));
+        Ok(Self {
+            grid: manifest.grid,
+            quantity: manifest.quantity,
+            steps: steps
+                .map(|step| (step.period, step.field.clone()))
+                .collect(),
+        })
+    }
+
+    /// Steps that are new, replaced and gone, and the change in words.
+    fn change_from(&self, before: Option<&Self>) -> ([u64; 3], String) {
+        let Some(before) = before else {
+            let count = self.steps.len();
+            return ([0; 3], format!("first version that is kept, {count} steps"));
+        };
+        let mut counts = [0; 3];
+        for (period, field) in &self.steps {
+            match before.steps.get(period) {
+                None => counts[0] += 1,
+                Some(old) => counts[1] += u64::from(old != field),
+            }
+        }
+        let is_gone = |period: &&Period| !self.steps.contains_key(*period);
+        counts[2] = before.steps.keys().filter(is_gone).count() as u64;
+        let mut words: Vec<String> = counts
+            .iter()
+            .zip(["added", "replaced", "removed"])
+            .filter(|(count, _)| **count > 0)
+            .map(|(count, what)| format!("{count} steps {what}"))
+            .collect();
+        if self.grid != before.grid {
+            words.push("another grid".to_owned());
+        }
+        if self.quantity != before.quantity {
+            words.push("another quantity".to_owned());
+        }
+        (counts, words.join(", "))
+    }
+}
+
+/// The budget of a question by the versions of its product, oldest first.
+///
+/// # Errors
+/// `UnknownProduct`; `Contract` for a question of several rows or more versions than are summed at once.
+pub async fn history(engine: &Engine, query: &BudgetQuery) -> Result<BudgetHistory, ComputeError> {
+    if query.step != BudgetStep::Total || query.parts.is_some() {
+        let reason = "a history is of one number: ask for the total of one region";
+        return Err(
+            contract::ContractError::invalid("step", &query.step.to_string(), reason).into(),
+        );
+    }
+    let published = manifests::published(engine.store(), &query.product).await?;
+    if published.is_empty() {
+        return Err(ComputeError::UnknownProduct {
+            product: query.product.to_string(),
+            known: manifests::products(engine.store()).await?,
+        });
+    }
+    let (version_count, skipped) = (
+        published.len(),
+        published.len().saturating_sub(MOST_VERSIONS),
+    );
+    let mut notes = NOTES.map(str::to_owned).to_vec();
+    if skipped > 0 {
+        notes.push(format!("the {skipped} oldest versions were not looked at"));
+    }
+    let (mut versions, mut before) = (vec![], None);
+    for (number, at) in published.into_iter().skip(skipped) {
+        // Clean-up may have taken it meanwhile.
+        let found = manifests::numbered(engine.store(), &query.product, number).await?;
+        let Some(manifest) = found else { continue };
+        let reads = Reads::of(engine, query, &manifest).await?;
+        if before.as_ref() == Some(&reads) {
+            continue;
+        }
+        if versions.len() >= MOST_SUMMED {
+            let reason = format!(
+                "more than {MOST_SUMMED} versions changed it; ask for a period in the past (from, to), which fewer changed"
+            );
+            let name = query.product.as_str();
+            return Err(contract::ContractError::invalid("history", name, reason).into());
+        }
+        let change = reads.change_from(before.as_ref());
+        let last = versions
+            .iter()
+            .rev()
+            .find_map(|own: &VersionBudget| own.budget_tg);
+        versions.push(version(engine, query, (&manifest, at), change, last).await?);
+        before = Some(reads);
+    }
+    Ok(BudgetHistory {
+        product: query.product.clone(),
+        region: query.region_name.clone(),
+        unit: "Tg C".to_owned(),
+        version_count: version_count as u64,
+        notes,
+        versions,
+    })
+}
+
+async fn version(
+    engine: &Engine,
+    query: &BudgetQuery,
+    (manifest, published): (&Manifest, TimeMs),
+    ([steps_added, steps_replaced, steps_removed], changed): ([u64; 3], String),
+    last_tg: Option<f64>,
+) -> Result<VersionBudget, ComputeError> {
+    // One that holds nothing of the period is a line without a number.
+    let row = match query.steps(manifest) {
+        Ok(_) => budget_of(engine, query, manifest).await?.rows.pop(),
+        Err(_) => None,
+    };
+    let row = row.as_ref();
+    Ok(VersionBudget {
+        manifest: manifest.id(),
+        published,
+        changed,
+        steps_added,
+        steps_replaced,
+        steps_removed,
+        start: row.map(|row| row.start),
+        end: row.map(|row| row.end),
+        budget_kg: row.map(|row| row.budget_kg.clone()),
+        budget_tg: row.map(|row| row.budget_tg),
+        sigma_tg: row.and_then(|row| Some(row.uncertainty?.sigma_tg)),
+        difference_tg: row.and_then(|row| Some(row.budget_tg - last_tg?)),
+        coverage_percent: row.map(|row| row.coverage_percent),
+    })
+}

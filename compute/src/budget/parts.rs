@@ -1,0 +1,201 @@
+//! Parts beside the whole: rows of time beside their period, regions beside the region that they are parts of.
+
+use contract::budget::{
+    BudgetAnswer, BudgetParts, BudgetQuery, BudgetRow, Closure, RegionBudget, RegionsClosure,
+};
+use contract::manifest::Manifest;
+use contract::region::{AskedRegion, Polygon, Region};
+
+use super::fixed::{MASS_DECIMALS, decimal_text, steps_of_text};
+use super::query::of_region;
+use crate::region::extent::region_area_m2;
+use crate::region::mask;
+use crate::{ComputeError, Engine};
+
+/// Share of an area that regions may share, leave out or reach beyond before it is worth a word: areas are rounded.
+const AREA_SLACK: f64 = 1e-9;
+const M2_PER_MILLION_KM2: f64 = 1e12;
+
+/// What rows sum to beside their period as one row; none if a sum leaves 128 bits.
+pub(super) fn of_time(rows: &[BudgetRow], total: &[BudgetRow]) -> Option<Closure> {
+    Some(Closure {
+        rows_kg: decimal_text(mass_steps(rows)?, MASS_DECIMALS),
+        total_kg: decimal_text(mass_steps(total)?, MASS_DECIMALS),
+        regions: None,
+    })
+}
+
+/// Sum of rows, kg in steps of 10⁻⁹.
+fn mass_steps(rows: &[BudgetRow]) -> Option<i128> {
+    let mut steps = rows
+        .iter()
+        .map(|row| steps_of_text(&row.budget_kg, MASS_DECIMALS));
+    steps.try_fold(0i128, |sum, own| sum.checked_add(own?))
+}
+
+/// Adds the budgets of parts of the region to an answer, and what they come to beside it.
+///
+/// # Errors
+/// `Region` for a part that has no budget, or parts that reach beyond the region.
+pub(super) async fn add(
+    engine: &Engine,
+    query: &BudgetQuery,
+    manifest: &Manifest,
+    asked: &BudgetParts,
+    answer: &mut BudgetAnswer,
+) -> Result<(), ComputeError> {
+    let of_mask;
+    let parts = match asked {
+        BudgetParts::Regions(regions) => regions,
+        BudgetParts::Mask(mask) => {
+            of_mask = mask::regions(engine.store(), mask).await?;
+            &of_mask
+        }
+    };
+    let together: Vec<Polygon> = parts
+        .iter()
+        .flat_map(|part| polygons(&part.region))
+        .collect();
+    check_inside(query, &together)?;
+    let mut budgets = vec![];
+    for part in parts {
+        budgets.push(budget(engine, query, manifest, part).await?);
+    }
+    let union = AskedRegion {
+        region: Region::Polygons(together),
+        name: "all regions together".to_owned(),
+    };
+    let united = BudgetQuery {
+        errors: None,
+        ..query.clone()
+    };
+    let united = budget(engine, &united, manifest, &union).await?;
+    let closure = closure(answer, &budgets, &united).ok_or_else(|| {
+        ComputeError::inconsistent(manifest.id().to_string(), "its sums exceed 128 bits")
+    })?;
+    let of_rows = of_time(&answer.rows, &answer.rows).ok_or_else(|| {
+        ComputeError::inconsistent(manifest.id().to_string(), "its sums exceed 128 bits")
+    })?;
+    answer.closure.get_or_insert(of_rows).regions = Some(closure);
+    answer.regions = budgets;
+    Ok(())
+}
+
+async fn budget(
+    engine: &Engine,
+    query: &BudgetQuery,
+    manifest: &Manifest,
+    part: &AskedRegion,
+) -> Result<RegionBudget, ComputeError> {
+    let own = BudgetQuery {
+        region: part.region.clone(),
+        region_name: part.name.clone(),
+        river: None,
+        parts: None,
+        ..query.clone()
+    };
+    let answer = of_region(engine, &own, manifest)
+        .await
+        .map_err(|e| match e {
+            ComputeError::Region { reason } => named(&part.name, &reason),
+            outside @ ComputeError::RegionOutside { .. } => named(&part.name, &outside.to_string()),
+            other => other,
+        })?;
+    Ok(RegionBudget {
+        region: answer.region,
+        region_area_m2: answer.region_area_m2,
+        ocean_area_m2: answer.ocean_area_m2,
+        notes: answer.notes,
+        rows: answer.rows,
+    })
+}
+
+fn named(part: &str, reason: &str) -> ComputeError {
+    ComputeError::Region {
+        reason: format!("{part}: {reason}"),
+    }
+}
+
+/// The region as polygons.
+fn polygons(region: &Region) -> Vec<Polygon> {
+    let rectangle = |[west, south, east, north]: [f64; 4]| {
+        vec![Polygon {
+            outer: vec![[west, south], [east, south], [east, north], [west, north]],
+            holes: vec![],
+        }]
+    };
+    match region {
+        Region::Global => rectangle([-180.0, -90.0, 180.0, 90.0]),
+        Region::Box {
+            west,
+            south,
+            east,
+            north,
+        } => rectangle([*west, *south, *east, *north]),
+        Region::Polygons(polygons) => polygons.clone(),
+    }
+}
+
+/// # Errors
+/// Parts lie outside of what they are to be parts of.
+fn check_inside(query: &BudgetQuery, parts: &[Polygon]) -> Result<(), ComputeError> {
+    if query.region == Region::Global {
+        return Ok(());
+    }
+    let both = [polygons(&query.region), parts.to_vec()].concat();
+    let both_m2 = region_area_m2(&Region::Polygons(both), query.earth)?;
+    let whole_m2 = region_area_m2(&Region::Polygons(polygons(&query.region)), query.earth)?;
+    if both_m2 <= whole_m2 * (1.0 + AREA_SLACK) {
+        return Ok(());
+    }
+    Err(ComputeError::Region {
+        reason: format!(
+            "the regions reach {:.6} million km² beyond {}, which they are to be parts of: ask for a region that holds them, \
+             such as global",
+            (both_m2 - whole_m2) / M2_PER_MILLION_KM2,
+            query.region_name
+        ),
+    })
+}
+
+/// None if a sum leaves 128 bits.
+fn closure(
+    whole: &BudgetAnswer,
+    parts: &[RegionBudget],
+    united: &RegionBudget,
+) -> Option<RegionsClosure> {
+    let text = |steps: i128| decimal_text(steps, MASS_DECIMALS);
+    let mut of_parts = parts.iter().map(|part| mass_steps(&part.rows));
+    let regions = of_parts.try_fold(0i128, |sum, own| sum.checked_add(own?))?;
+    let (whole_steps, union) = (mass_steps(&whole.rows)?, mass_steps(&united.rows)?);
+    let areas_m2: f64 = parts.iter().map(|part| part.region_area_m2).sum();
+    let at_least_0 = |m2: f64| if m2 > AREA_SLACK * areas_m2 { m2 } else { 0.0 };
+    let overlap_m2 = at_least_0(areas_m2 - united.region_area_m2);
+    let left_out_m2 = at_least_0(whole.region_area_m2 - united.region_area_m2);
+    let million = |m2: f64| format!("{:.6} million km²", m2 / M2_PER_MILLION_KM2);
+    let summary = match (overlap_m2 > 0.0, left_out_m2 > 0.0) {
+        (false, false) => "the regions fill the whole and do not overlap".to_owned(),
+        (true, false) => format!(
+            "the regions fill the whole and overlap by {}",
+            million(overlap_m2)
+        ),
+        (false, true) => format!(
+            "the regions do not overlap and leave {} of the whole out, land included",
+            million(left_out_m2)
+        ),
+        (true, true) => format!(
+            "the regions overlap by {} and leave {} of the whole out, land included",
+            million(overlap_m2),
+            million(left_out_m2)
+        ),
+    };
+    Some(RegionsClosure {
+        regions_kg: text(regions),
+        overlap_kg: text(regions.checked_sub(union)?),
+        left_out_kg: text(whole_steps.checked_sub(union)?),
+        whole_kg: text(whole_steps),
+        overlap_m2,
+        left_out_m2,
+        summary,
+    })
+}

@@ -1,0 +1,316 @@
+//! Parts beside the whole, to the last digit: months and years, regions that fill, overlap and leave out, codes of a mask, rivers.
+
+use std::sync::Arc;
+
+use compute::{Engine, ErrorClass, budget};
+use contract::budget::{
+    AskedRiver, BudgetAnswer, BudgetParts, BudgetQuery, BudgetStep, StatedRiver,
+};
+use contract::grid::Grid;
+use contract::quantity::{Quantity, SECONDS_PER_YEAR};
+use contract::region::{AskedRegion, Region, named_regions};
+use contract::time::{Period, TimeMs};
+
+use crate::fixture::{ONE_DEGREE, ask, folder_store, land, months, product, total, wavy_year};
+
+const DAY_MS: i64 = 86_400_000;
+
+/// A decimal text of nine decimals as a whole number.
+fn steps(text: &str) -> i128 {
+    text.replace('.', "").parse().unwrap()
+}
+
+fn square(name: &str, [west, south, east, north]: [f64; 4]) -> String {
+    format!(
+        r#"{{"type":"Feature","properties":{{"name":"{name}"}},"geometry":{{"type":"Polygon","coordinates":[[[{west},{south}],[{east},{south}],[{east},{north}],[{west},{north}],[{west},{south}]]]}}}}"#
+    )
+}
+
+fn regions(squares: &[(&str, [f64; 4])]) -> Vec<AskedRegion> {
+    let features: Vec<String> = squares.iter().map(|(name, at)| square(name, *at)).collect();
+    let features = features.join(",");
+    named_regions(&format!(
+        r#"{{"type":"FeatureCollection","features":[{features}]}}"#
+    ))
+    .unwrap()
+}
+
+async fn wavy() -> (tempfile::TempDir, Engine) {
+    let (folder, store) = folder_store();
+    let id = product("wavy");
+    land(
+        &store,
+        &id,
+        Quantity::CarbonFlux,
+        ONE_DEGREE,
+        &wavy_year(&ONE_DEGREE),
+    )
+    .await;
+    (folder, Engine::local(store))
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn weeks_that_months_cut_sum_to_the_year_to_the_last_digit() {
+    let (_folder, store) = folder_store();
+    let grid = Grid {
+        rows: 6,
+        cols: 12,
+        dlat_deg: 30.0,
+        dlon_deg: 30.0,
+        ..ONE_DEGREE
+    };
+    let start = months(2000)[0].start.ms();
+    let week = |week: i64| {
+        let at = |days: i64| TimeMs::new(start + days * DAY_MS).unwrap();
+        let value = |cell: usize| 1.3e-9 * ((cell as f32).sin() + (week as f32 * 0.7).cos());
+        let period = Period::new(at(7 * week), at(7 * week + 7)).unwrap();
+        (period, (0..grid.cell_count()).map(value).collect())
+    };
+    let weeks: Vec<_> = (0..60).map(week).collect();
+    land(
+        &store,
+        &product("weeks"),
+        Quantity::CarbonFlux,
+        grid,
+        &weeks,
+    )
+    .await;
+    let engine = Engine::local(store);
+    let of = |step| BudgetQuery {
+        step,
+        ..total(&product("weeks"), "-60,-30,100,60")
+    };
+    let whole = ask(&engine, &of(BudgetStep::Total)).await;
+    for (step, rows) in [(BudgetStep::Month, 14), (BudgetStep::Year, 2)] {
+        let answer = ask(&engine, &of(step)).await;
+        assert_eq!(answer.rows.len(), rows);
+        let sum: i128 = answer.rows.iter().map(|row| steps(&row.budget_kg)).sum();
+        assert_eq!(sum, steps(&whole.rows[0].budget_kg));
+        let closure = answer.closure.unwrap();
+        assert_eq!(closure.rows_kg, closure.total_kg);
+        assert_eq!(closure.total_kg, whole.rows[0].budget_kg);
+    }
+    assert_eq!(whole.closure, None);
+}
+
+/// Each part, the whole and the union asked by themselves.
+async fn check(engine: &Engine, query: &BudgetQuery, parts: &[AskedRegion], answer: &BudgetAnswer) {
+    let alone = |asked: AskedRegion| BudgetQuery {
+        region: asked.region,
+        region_name: asked.name,
+        parts: None,
+        ..query.clone()
+    };
+    let sum = |answer: &BudgetAnswer| -> i128 {
+        answer.rows.iter().map(|row| steps(&row.budget_kg)).sum()
+    };
+    let mut of_parts = 0;
+    for (part, own) in parts.iter().zip(&answer.regions) {
+        let asked = ask(engine, &alone(part.clone())).await;
+        assert_eq!((&asked.region, &asked.rows), (&own.region, &own.rows));
+        of_parts += sum(&asked);
+    }
+    let polygons = parts.iter().flat_map(|part| match &part.region {
+        Region::Polygons(polygons) => polygons.clone(),
+        other => panic!("{other:?}"),
+    });
+    let union = AskedRegion {
+        region: Region::Polygons(polygons.collect()),
+        name: "union".to_owned(),
+    };
+    let union = sum(&ask(engine, &alone(union)).await);
+    let whole = sum(answer);
+    let closure = answer.closure.as_ref().unwrap();
+    let own = closure.regions.as_ref().unwrap();
+    assert_eq!(steps(&own.regions_kg), of_parts);
+    assert_eq!(steps(&own.whole_kg), whole);
+    assert_eq!(steps(&own.overlap_kg), of_parts - union);
+    assert_eq!(steps(&own.left_out_kg), whole - union);
+    assert_eq!(
+        of_parts - steps(&own.overlap_kg) + steps(&own.left_out_kg),
+        whole
+    );
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn regions_sum_to_the_whole_with_what_they_share_and_leave_out() {
+    let (_folder, engine) = wavy().await;
+    let filling = [
+        ("west", [10.0, -20.0, 30.0, 15.0]),
+        ("east", [30.0, -20.0, 50.0, 15.0]),
+    ];
+    let crossing = [
+        ("west", [10.0, -20.0, 33.3, 15.0]),
+        ("east", [30.0, -20.0, 50.0, 15.0]),
+    ];
+    let leaving = [
+        ("west", [10.0, -20.0, 30.0, 15.0]),
+        ("north", [30.5, 0.25, 50.0, 15.0]),
+    ];
+    for (squares, overlaps, leaves) in [
+        (filling, false, false),
+        (crossing, true, false),
+        (leaving, false, true),
+    ] {
+        let parts = regions(&squares);
+        let query = BudgetQuery {
+            step: BudgetStep::Year,
+            parts: Some(BudgetParts::Regions(parts.clone())),
+            ..total(&product("wavy"), "10,-20,50,15")
+        };
+        let answer = ask(&engine, &query).await;
+        check(&engine, &query, &parts, &answer).await;
+        let own = answer.closure.unwrap().regions.unwrap();
+        assert_eq!(
+            (own.overlap_m2 > 0.0, own.left_out_m2 > 0.0),
+            (overlaps, leaves)
+        );
+        assert_eq!(
+            own.summary.contains("overlap by"),
+            overlaps,
+            "{}",
+            own.summary
+        );
+        assert_eq!(own.summary.contains("whole out"), leaves, "{}", own.summary);
+        if !overlaps && !leaves {
+            // What is left is rounding of areas, far below a part in 10^12 of what lies there.
+            for kg in [&own.overlap_kg, &own.left_out_kg] {
+                assert!(kg.parse::<f64>().unwrap().abs() < 1e-2, "{kg}");
+            }
+        }
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn every_code_of_a_mask_is_a_region() {
+    let (_folder, store) = folder_store();
+    let id = product("wavy");
+    land(
+        &store,
+        &id,
+        Quantity::CarbonFlux,
+        ONE_DEGREE,
+        &wavy_year(&ONE_DEGREE),
+    )
+    .await;
+    let code = |cell: usize| match (cell / 360, cell % 360) {
+        (0..60, _) => 1.0,
+        (60..150, 0..100) => 2.0,
+        (60..150, _) => 3.0,
+        _ => f32::NAN,
+    };
+    let codes: Vec<f32> = (0..ONE_DEGREE.cell_count()).map(code).collect();
+    let quantity = Quantity::open("basin", "1", "Basins").unwrap();
+    let steps = [(Period::year(2000).unwrap(), codes)];
+    let mask = Arc::new(land(&store, &product("basins"), quantity, ONE_DEGREE, &steps).await);
+    let engine = Engine::local(store);
+    let query = BudgetQuery {
+        parts: Some(BudgetParts::Mask(Arc::clone(&mask))),
+        ..total(&id, "global")
+    };
+    let answer = ask(&engine, &query).await;
+    let names: Vec<_> = answer
+        .regions
+        .iter()
+        .map(|one| one.region.clone())
+        .collect();
+    assert_eq!(names, [1, 2, 3].map(|code| format!("{}:{code}", mask.id())));
+    let own = answer.closure.unwrap().regions.unwrap();
+    assert!(
+        own.overlap_m2 <= 0.0 && own.left_out_m2 > 0.0,
+        "{}",
+        own.summary
+    );
+    let south = ask(&engine, &total(&id, "-180,-90,180,-60")).await;
+    let (left, south) = (
+        own.left_out_kg.parse::<f64>().unwrap(),
+        &south.rows[0].budget_kg,
+    );
+    let south: f64 = south.parse().unwrap();
+    assert!((left / south - 1.0).abs() < 1e-9, "{left} {south}");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn regions_that_are_no_parts_are_refused() {
+    let (_folder, engine) = wavy().await;
+    let refused = async |region: &str, squares: &[(&str, [f64; 4])]| {
+        let query = BudgetQuery {
+            parts: Some(BudgetParts::Regions(regions(squares))),
+            ..total(&product("wavy"), region)
+        };
+        let refused = budget(&engine, &query).await.unwrap_err();
+        assert_eq!(refused.class(), ErrorClass::BadRequest);
+        refused.to_string()
+    };
+    let beyond = refused("0,0,10,10", &[("far", [5.0, 5.0, 15.0, 10.0])]).await;
+    assert!(beyond.contains("beyond 0,0,10,10"), "{beyond}");
+    let flat = refused("global", &[("flat", [5.0, 5.0, 15.0, 5.0])]).await;
+    assert!(flat.contains("flat"), "{flat}");
+}
+
+fn river(flux: &str, source: Option<&str>) -> AskedRiver {
+    AskedRiver::asked(Some(flux), source).unwrap().unwrap()
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_river_flux_is_taken_off_by_the_length_of_rows() {
+    let (_folder, store) = folder_store();
+    let id = product("wavy");
+    land(
+        &store,
+        &id,
+        Quantity::CarbonFlux,
+        ONE_DEGREE,
+        &wavy_year(&ONE_DEGREE),
+    )
+    .await;
+    let half: Vec<_> = wavy_year(&ONE_DEGREE).into_iter().take(6).collect();
+    let rivers = land(
+        &store,
+        &product("rivers"),
+        Quantity::CarbonFlux,
+        ONE_DEGREE,
+        &half,
+    )
+    .await;
+    let engine = Engine::local(store);
+    let of = |river: AskedRiver, to: Option<&str>| BudgetQuery {
+        step: BudgetStep::Month,
+        to: to.map(|to| to.parse().unwrap()),
+        river: Some(river),
+        ..total(&id, "14n-50n")
+    };
+    let stated = of(river("650+-300", Some("Regnier et al. (2022)")), None);
+    let answer = ask(&engine, &stated).await;
+    for row in &answer.rows {
+        let years = (row.end.ms() - row.start.ms()) as f64 / 1000.0 / SECONDS_PER_YEAR;
+        let own = row.river.unwrap();
+        assert!((own.river_tg / (650.0 * years) - 1.0).abs() < 1e-12);
+        assert!((own.anthropogenic_tg - (row.budget_tg - own.river_tg)).abs() < 1e-9);
+        assert_eq!(own.sigma_tg, None);
+    }
+    let basis = answer.river.unwrap();
+    assert_eq!(basis.source, "Regnier et al. (2022)");
+    assert_eq!(
+        (basis.tg_per_year, basis.sigma_tg_per_year),
+        (Some(650.0), Some(300.0))
+    );
+
+    // A product of the same values leaves nothing, and one that ends early is refused.
+    let stored = AskedRiver {
+        of_product: Some(Arc::new(rivers.clone())),
+        ..river("rivers", None)
+    };
+    assert!(matches!(stored.stated, StatedRiver::Product(_)));
+    let answer = ask(&engine, &of(stored.clone(), Some("2000-07"))).await;
+    assert_eq!(answer.river.as_ref().unwrap().manifest, Some(rivers.id()));
+    assert!(
+        answer
+            .rows
+            .iter()
+            .all(|row| row.river.unwrap().anthropogenic_tg.abs() < 1e-12)
+    );
+    let refused = budget(&engine, &of(stored, None)).await.unwrap_err();
+    let wanted = "does not cover all of 2000-07-01";
+    assert!(refused.to_string().contains(wanted), "{refused}");
+}

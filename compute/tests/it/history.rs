@@ -1,0 +1,151 @@
+//! One budget over the versions of its product.
+
+use compute::budget::history;
+use compute::{Engine, ErrorClass};
+use contract::budget::{BudgetQuery, BudgetStep, ErrorWords};
+use contract::grid::Grid;
+use contract::quantity::Quantity;
+use contract::time::Period;
+use storage::Store;
+use storage::manifests::{self, AtInstant};
+
+use crate::fixture::{ask, folder_store, land, product, total};
+
+const GRID: Grid = Grid {
+    rows: 6,
+    cols: 12,
+    north_deg: 90.0,
+    west_deg: -180.0,
+    dlat_deg: 30.0,
+    dlon_deg: 30.0,
+};
+
+/// A version of some months of 2000, each of an even flux.
+async fn publish(store: &Store, months: &[(u32, f32)]) {
+    let steps: Vec<_> = months
+        .iter()
+        .map(|(month, flux)| {
+            let period = Period::month(2000, *month).unwrap();
+            (period, vec![*flux; GRID.cell_count()])
+        })
+        .collect();
+    land(store, &product("flux"), Quantity::CarbonFlux, GRID, &steps).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn each_version_that_changed_the_question_is_a_line() {
+    let (_folder, store) = folder_store();
+    publish(&store, &[(1, 1e-9)]).await;
+    publish(&store, &[(1, 1e-9), (2, 1e-9)]).await;
+    // Of what is asked for nothing changes.
+    publish(&store, &[(1, 1e-9), (2, 1e-9), (5, 1e-9)]).await;
+    publish(&store, &[(1, 2e-9), (2, 1e-9), (5, 1e-9)]).await;
+    publish(&store, &[(5, 1e-9)]).await;
+    let engine = Engine::local(store.clone());
+    let words = ErrorWords {
+        error: Some("10%"),
+        correlation_length_km: Some(1000.0),
+        ..ErrorWords::default()
+    };
+    let query = BudgetQuery {
+        from: Some("2000-01".parse().unwrap()),
+        to: Some("2000-03".parse().unwrap()),
+        errors: words.asked().unwrap(),
+        ..total(&product("flux"), "0,-30,60,30")
+    };
+    let found = history(&engine, &query).await.unwrap();
+    assert_eq!(found.version_count, 5);
+    let numbers: Vec<_> = found
+        .versions
+        .iter()
+        .map(|own| own.manifest.number)
+        .collect();
+    assert_eq!(numbers, [1, 2, 4, 5]);
+    let changed: Vec<_> = found
+        .versions
+        .iter()
+        .map(|own| own.changed.as_str())
+        .collect();
+    assert_eq!(
+        changed,
+        [
+            "first version that is kept, 1 steps",
+            "1 steps added",
+            "1 steps replaced",
+            "2 steps removed"
+        ]
+    );
+    assert!(found.versions.is_sorted_by_key(|own| own.published));
+    for (at, own) in found.versions[..3].iter().enumerate() {
+        let manifest = manifests::load(&store, &own.manifest).await.unwrap();
+        let answer = compute::budget::budget_of(&engine, &query, &manifest)
+            .await
+            .unwrap();
+        assert_eq!(own.budget_kg.as_ref(), Some(&answer.rows[0].budget_kg));
+        assert_eq!(
+            own.sigma_tg,
+            answer.rows[0].uncertainty.map(|own| own.sigma_tg)
+        );
+        let before = at
+            .checked_sub(1)
+            .and_then(|at| found.versions[at].budget_tg);
+        let wanted = before.map(|before| answer.rows[0].budget_tg - before);
+        assert_eq!(own.difference_tg, wanted);
+    }
+    let last = found.versions.last().unwrap();
+    assert_eq!((&last.budget_kg, last.difference_tg), (&None, None));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_version_is_found_by_when_it_was_published() {
+    let (_folder, store) = folder_store();
+    publish(&store, &[(1, 1e-9)]).await;
+    tokio::time::sleep(std::time::Duration::from_millis(20)).await;
+    publish(&store, &[(1, 2e-9)]).await;
+    let id = product("flux");
+    let dates = manifests::published(&store, &id).await.unwrap();
+    let [(1, first), (2, second)] = dates[..] else {
+        panic!("{dates:?}")
+    };
+    assert!(first < second);
+    let at = async |ms: i64| {
+        let instant = contract::time::TimeMs::new(ms).unwrap();
+        manifests::as_of(&store, &id, instant).await.unwrap()
+    };
+    for (ms, number) in [
+        (first.ms(), 1),
+        (second.ms() - 1, 1),
+        (second.ms(), 2),
+        (second.ms() + 9, 2),
+    ] {
+        match at(ms).await {
+            AtInstant::Version(own) => assert_eq!(own.number, number),
+            other => panic!("{other:?}"),
+        }
+    }
+    assert_eq!(at(first.ms() - 1).await, AtInstant::BeforeFirst(first));
+    let nothing = manifests::as_of(&store, &product("none"), first)
+        .await
+        .unwrap();
+    assert_eq!(nothing, AtInstant::Nothing);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn what_has_no_history_is_refused() {
+    let (_folder, store) = folder_store();
+    publish(&store, &[(1, 1e-9)]).await;
+    let engine = Engine::local(store);
+    let months = BudgetQuery {
+        step: BudgetStep::Month,
+        ..total(&product("flux"), "global")
+    };
+    let refused = history(&engine, &months).await.unwrap_err();
+    assert_eq!(refused.class(), ErrorClass::BadRequest);
+    assert!(refused.to_string().contains("one number"), "{refused}");
+    let unknown = history(&engine, &total(&product("none"), "global"))
+        .await
+        .unwrap_err();
+    assert_eq!(unknown.class(), ErrorClass::NotFound);
+    let globe = ask(&engine, &total(&product("flux"), "global")).await;
+    assert!(globe.uncertainty.is_none());
+}

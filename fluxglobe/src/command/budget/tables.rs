@@ -1,0 +1,174 @@
+//! Budgets as tables.
+
+use comfy_table::presets::NOTHING;
+use comfy_table::{CellAlignment, Table};
+use contract::budget::{BudgetAnswer, BudgetHistory, BudgetRow};
+
+use super::M2_PER_MILLION_KM2;
+use crate::progress;
+
+/// Columns of days and words, which stand to the left.
+const WORDS: [&str; 6] = [
+    "region",
+    "from",
+    "to",
+    "version",
+    "published",
+    "what it changed",
+];
+
+/// A line a row; of several regions each has its lines, and the whole stands last.
+pub(super) fn of(answer: &BudgetAnswer) -> Table {
+    let columns = Columns {
+        region: !answer.regions.is_empty(),
+        uncertainty: answer.uncertainty.is_some(),
+        river: answer.river.is_some(),
+        completeness: answer.rows.iter().any(|row| row.completeness.is_some()),
+    };
+    let mut table = table(columns.header());
+    for region in &answer.regions {
+        for row in &region.rows {
+            table.add_row(columns.cells(&region.region, row));
+        }
+    }
+    for row in &answer.rows {
+        table.add_row(columns.cells(&answer.region, row));
+    }
+    table
+}
+
+fn table(header: Vec<&str>) -> Table {
+    let mut table = Table::new();
+    table.load_preset(NOTHING);
+    let numbers: Vec<usize> = (0..header.len())
+        .filter(|at| !WORDS.contains(&header[*at]))
+        .collect();
+    table.set_header(header);
+    for at in numbers {
+        if let Some(column) = table.column_mut(at) {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+    }
+    table
+}
+
+/// What stands beside the budget.
+#[derive(Clone, Copy)]
+#[expect(clippy::struct_excessive_bools, reason = "one a group of columns")]
+struct Columns {
+    region: bool,
+    uncertainty: bool,
+    river: bool,
+    completeness: bool,
+}
+
+impl Columns {
+    fn header(self) -> Vec<&'static str> {
+        let mut header = vec![];
+        if self.region {
+            header.push("region");
+        }
+        header.extend(["from", "to", "Tg C"]);
+        if self.uncertainty {
+            header.push("±");
+        }
+        if self.river {
+            header.extend(["rivers Tg C", "anthropogenic Tg C"]);
+            if self.uncertainty {
+                header.push("its ±");
+            }
+        }
+        header.extend([
+            "% of sea",
+            "10⁶ km² of sea with data",
+            "gaps would add Tg C",
+            "for 10⁶ km²",
+        ]);
+        if self.completeness {
+            header.extend(["10⁶ km² complete", "incomplete", "% complete"]);
+        }
+        header
+    }
+
+    fn cells(self, region: &str, row: &BudgetRow) -> Vec<String> {
+        let optional = |value: Option<f64>| {
+            value.map_or_else(|| "unknown".to_owned(), |value| format!("{value:.3}"))
+        };
+        let mut cells = vec![];
+        if self.region {
+            cells.push(region.to_owned());
+        }
+        cells.extend([
+            progress::day(row.start),
+            progress::day(row.end),
+            format!("{:.3}", row.budget_tg),
+        ]);
+        if self.uncertainty {
+            cells.push(optional(row.uncertainty.map(|own| own.sigma_tg)));
+        }
+        if self.river {
+            let of = |part: fn(&contract::budget::RowRiver) -> f64| {
+                row.river
+                    .as_ref()
+                    .map_or_else(String::new, |own| format!("{:.3}", part(own)))
+            };
+            cells.extend([of(|own| own.river_tg), of(|own| own.anthropogenic_tg)]);
+            if self.uncertainty {
+                let sigma = row.river.and_then(|own| own.sigma_tg);
+                cells.push(sigma.map_or_else(String::new, |sigma| format!("{sigma:.3}")));
+            }
+        }
+        cells.extend([
+            format!("{:.1}", row.coverage_percent),
+            format!("{:.3}", row.ocean_with_data_m2 / M2_PER_MILLION_KM2),
+            optional(row.gap_tg),
+            format!("{:.3}", row.gap_area_m2 / M2_PER_MILLION_KM2),
+        ]);
+        if let Some(completeness) = &row.completeness {
+            cells.push(format!(
+                "{:.3}",
+                completeness.complete_m2 / M2_PER_MILLION_KM2
+            ));
+            cells.push(format!(
+                "{:.3}",
+                completeness.incomplete_m2 / M2_PER_MILLION_KM2
+            ));
+            let percent = completeness.percent();
+            cells.push(percent.map_or("no data".to_owned(), |percent| format!("{percent:.1}")));
+        }
+        cells
+    }
+}
+
+/// A line a version.
+pub(super) fn of_history(answer: &BudgetHistory) -> Table {
+    let has_sigma = answer.versions.iter().any(|own| own.sigma_tg.is_some());
+    let mut header = vec!["version", "published", "what it changed", "Tg C"];
+    if has_sigma {
+        header.push("±");
+    }
+    header.extend(["change", "% of sea"]);
+    let mut table = table(header);
+    for own in &answer.versions {
+        let number = |value: Option<f64>, decimals: usize| {
+            value.map_or_else(String::new, |value| format!("{value:.decimals$}"))
+        };
+        let budget = match own.budget_tg {
+            Some(budget_tg) => format!("{budget_tg:.3}"),
+            None => "no step in the period".to_owned(),
+        };
+        let mut cells = vec![
+            own.manifest.to_string(),
+            own.published.to_string(),
+            own.changed.clone(),
+            budget,
+        ];
+        if has_sigma {
+            cells.push(number(own.sigma_tg, 3));
+        }
+        let change = own.difference_tg.map(|change| format!("{change:+.3}"));
+        cells.extend([change.unwrap_or_default(), number(own.coverage_percent, 1)]);
+        table.add_row(cells);
+    }
+    table
+}
