@@ -13,10 +13,13 @@ use zarrs::array::{
 };
 
 use crate::layout::{BLOCK_CELLS, RUN_STEPS};
+use crate::record::RECORD_BYTES;
 use crate::{CubeError, Description, Layout, cf};
 
 /// Group of the time-major copy.
 pub(crate) const SERIES: &str = "series";
+/// Group of sums of blocks.
+pub(crate) const SUMS: &str = "sums";
 /// Steps in a chunk of the time coordinate.
 pub(crate) const TIME_CHUNK: u64 = 1024;
 /// Steps in a chunk of digests, which do not compress.
@@ -81,10 +84,39 @@ pub(crate) fn series(description: &Description, runs: usize) -> Result<Definitio
     )
 }
 
-/// Of each run of the time-major copy what it was made of, `[run, byte]`; zeros of one that is not there.
-pub(crate) fn runs(runs: usize) -> Result<Definition, CubeError> {
+/// Sums of blocks, `[block row, block column, byte]` of runs: shards as those of the time-major copy, a chunk a record.
+pub(crate) fn sums(description: &Description, runs: usize) -> Result<Definition, CubeError> {
+    let (grid, shard) = (
+        &description.grid,
+        Layout::of(&description.grid).series_object(),
+    );
+    let record = RECORD_BYTES as u64;
+    let blocks = |cells: u32| u64::from(cells.div_ceil(BLOCK_CELLS));
     let shape = Shape {
-        name: format!("{SERIES}/steps_sha256"),
+        name: format!("{SUMS}/blocks"),
+        cells: vec![blocks(grid.rows), blocks(grid.cols), runs as u64 * record],
+        chunk: vec![blocks(shard[0]), blocks(shard[1]), record],
+        dimensions: &["block_row", "block_col", "byte"],
+    };
+    let inner = Some(vec![1, 1, record]);
+    define(&shape, uint8(), 0u8.into(), Map::new(), inner)
+}
+
+/// What a cell of each row of a grid weighs in sums, `[row]`.
+pub(crate) fn row_weights(grid: &Grid) -> Result<Definition, CubeError> {
+    let shape = Shape {
+        name: format!("{SUMS}/row_weights"),
+        cells: vec![grid.rows.into()],
+        chunk: vec![grid.rows.into()],
+        dimensions: &["row"],
+    };
+    define(&shape, int64(), 0i64.into(), Map::new(), None)
+}
+
+/// Of each run of a group what it was made of, `[run, byte]`; zeros of one that is not there.
+pub(crate) fn runs(group: &str, runs: usize) -> Result<Definition, CubeError> {
+    let shape = Shape {
+        name: format!("{group}/steps_sha256"),
         cells: vec![runs as u64, DIGEST_BYTES],
         chunk: vec![DIGEST_CHUNK, DIGEST_BYTES],
         dimensions: &["run", "sha256_byte"],

@@ -1,22 +1,27 @@
-//! Blocks of the time-major copy: each is read by its own bytes, which the index at the end of its shard tells.
+//! Blocks of the time-major copy, and records of sums of them, which lie in shards as they do: each is read by its own bytes,
+//! which the index at the end of its shard tells.
 //!
 //! The library's reader of shards holds every index that it ever saw, and reads one at a time; a region of a large grid
 //! touches thousands of them.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 use std::sync::Arc;
 
 use bytes::Bytes;
 use futures::stream::{self, StreamExt as _, TryStreamExt as _};
+use icechunk::format::manifest::ChunkPayload;
+use icechunk::format::{ChunkIndices, Path};
 use quick_cache::Weighter;
 use quick_cache::sync::Cache;
-use zarrs::array::Array;
+use zarrs::array::{Array, ElementOwned};
 use zarrs::storage::AsyncReadableStorageTraits as _;
 use zarrs::storage::byte_range::ByteRange;
 use zarrs_icechunk::AsyncIcechunkStore;
 
 use crate::error::first_lines;
 use crate::layout::{BLOCK_CELLS, RUN_STEPS};
+use crate::object_storage::ObjectStorage;
 use crate::unreadable::Object;
 use crate::{CubeError, Description, Layout, arrays};
 
@@ -26,9 +31,9 @@ const INDEX_BYTES: u64 = 16 << 20;
 const ENTRY_BYTES: usize = 16;
 /// Bytes of the checksum of an index, or of a block.
 const CRC_BYTES: usize = 4;
-/// Blocks of a shard that so few bytes lie between are read together: that is quicker than to ask again.
-const GAP_BYTES: u64 = 32 << 10;
-/// Parts of a shard that are read at a time.
+/// Blocks of a shard that so few bytes lie between are read together: that is quicker than to read another part.
+const GAP_BYTES: u64 = 8 << 10;
+/// Parts of a shard that is no object of its own, which are read at a time.
 const READS_AT_ONCE: usize = 8;
 const NO_SHARD: &str = "its shard is not there";
 /// Values of a block in a run.
@@ -40,6 +45,13 @@ type Index = Vec<[u32; 2]>;
 
 /// A block in its shard: its first byte, how many it has, and which it is of those asked for.
 type Place = (u64, u64, usize);
+
+/// What lies from the first of some places to the last.
+fn range_of(near: &[Place]) -> Range<u64> {
+    let start = near.first().map_or(0, |(offset, ..)| *offset);
+    let ends = near.iter().map(|(offset, length, _)| offset + length);
+    start..ends.max().unwrap_or(start)
+}
 
 #[derive(Clone)]
 struct IndexWeight;
@@ -56,6 +68,9 @@ pub(crate) struct Blocks {
     /// Rows and columns of blocks in a shard.
     shard: [u32; 2],
     indexes: Cache<[u64; 3], Arc<Index>, IndexWeight>,
+    path: Path,
+    /// Where its objects are.
+    objects: ObjectStorage,
     /// For messages.
     place: String,
 }
@@ -64,22 +79,27 @@ impl Blocks {
     pub(crate) fn new(
         array: Array<AsyncIcechunkStore>,
         description: &Description,
-        place: &str,
-    ) -> Self {
+        objects: &ObjectStorage,
+    ) -> Result<Self, CubeError> {
+        let place = objects.to_string();
+        let path = Path::new(array.path().as_str());
+        let path = path.map_err(|e| CubeError::library(&place, "naming an array", e))?;
         let [rows, cols] = Layout::of(&description.grid).series_object();
         let shard = [rows / BLOCK_CELLS, cols / BLOCK_CELLS];
         let entries = u64::from(shard[0] * shard[1]);
         let index_bytes = entries * size_of::<[u32; 2]>() as u64;
-        Self {
+        Ok(Self {
             array,
+            path,
+            objects: objects.clone(),
             shard,
             indexes: Cache::with_weighter(
                 (INDEX_BYTES / index_bytes.max(1)) as usize,
                 INDEX_BYTES,
                 IndexWeight,
             ),
-            place: place.to_owned(),
-        }
+            place,
+        })
     }
 
     /// Name of the array.
@@ -134,36 +154,43 @@ impl Blocks {
         places.retain(|(_offset, length, _number)| *length > 0);
         places.sort_unstable();
         let is_near = |a: &Place, b: &Place| b.0 <= a.0 + a.1 + GAP_BYTES;
-        let near = places.chunk_by(is_near).map(<[_]>::to_vec);
-        let near: Vec<Vec<Place>> = near.collect();
-        let reads = stream::iter(near).map(|near| self.read_together(key, near));
-        let mut reads = reads.buffered(READS_AT_ONCE);
-        while let Some((near, content)) = reads.try_next().await? {
-            let first = near.first().map_or(0, |(offset, ..)| *offset);
-            for (offset, length, number) in near {
-                let start = (offset - first) as usize;
-                let range = start..start + length as usize;
-                if range.end > content.len() {
+        let near: Vec<&[Place]> = places.chunk_by(is_near).collect();
+        let ranges: Vec<Range<u64>> = near.iter().map(|near| range_of(near)).collect();
+        let contents = self.parts(key, &ranges).await?;
+        for ((near, range), content) in near.iter().zip(&ranges).zip(contents) {
+            for (offset, length, number) in *near {
+                let start = (offset - range.start) as usize;
+                let own = start..start + *length as usize;
+                if own.end > content.len() {
                     return Err("its shard is shorter than its index says".to_owned());
                 }
-                found[number] = Some(content.slice(range));
+                found[*number] = Some(content.slice(own));
             }
         }
         Ok(())
     }
 
-    /// Reads what lies from the first of these places to the last.
-    async fn read_together(
-        &self,
-        key: [u64; 3],
-        near: Vec<Place>,
-    ) -> Result<(Vec<Place>, Bytes), String> {
-        let start = near.first().map_or(0, |(offset, ..)| *offset);
-        let ends = near.iter().map(|(offset, length, _)| offset + length);
-        let length = ends.max().unwrap_or(start) - start;
-        let range = ByteRange::FromStart(start, Some(length));
-        let content = self.part(key, range).await?.ok_or(NO_SHARD)?;
-        Ok((near, Bytes::from(content)))
+    /// Parts of a shard, in the order of their ranges. They are asked for at once where the store can: a region has many.
+    async fn parts(&self, shard: [u64; 3], ranges: &[Range<u64>]) -> Result<Vec<Bytes>, String> {
+        let index = ChunkIndices(shard.iter().map(|at| *at as u32).collect());
+        let session = self.array.storage().session();
+        let payload = session.read().await.get_chunk_ref(&self.path, &index).await;
+        if let Some(ChunkPayload::Ref(chunk)) = payload.map_err(|e| first_lines(&e))? {
+            let end = chunk.offset.saturating_add(chunk.length);
+            let moved = |range: &Range<u64>| {
+                let at = |place: u64| chunk.offset.saturating_add(place).min(end);
+                at(range.start)..at(range.end)
+            };
+            let ranges: Vec<Range<u64>> = ranges.iter().map(moved).collect();
+            return self.objects.parts(&chunk.id.to_string(), &ranges).await;
+        }
+        let read = |range: Range<u64>| async move {
+            let range = ByteRange::FromStart(range.start, Some(range.end - range.start));
+            let content = self.part(shard, range).await?.ok_or(NO_SHARD)?;
+            Ok::<_, String>(Bytes::from(content))
+        };
+        let reads = stream::iter(ranges.iter().cloned()).map(read);
+        reads.buffered(READS_AT_ONCE).try_collect().await
     }
 
     /// Where a block lies in its shard: first byte, and how many, none without data.
@@ -181,13 +208,13 @@ impl Blocks {
         self.object(key).unreadable(chunk, reason).await
     }
 
-    /// Values of a whole shard, `[row, col, step]`; none where no cell has data. The library compares the checksum of a
+    /// A whole shard, `[row, col, step]` of values, or `[row, col, byte]` of records; none where no cell has data. The library compares the checksum of a
     /// block where it decodes all of it.
-    pub(crate) async fn shard(
+    pub(crate) async fn shard<T: ElementOwned>(
         &self,
         run: usize,
         shard: [u32; 2],
-    ) -> Result<Option<Vec<f32>>, CubeError> {
+    ) -> Result<Option<Vec<T>>, CubeError> {
         let index = [shard[0].into(), shard[1].into(), run as u64];
         let found = self.array.async_retrieve_chunk_if_exists(&index).await;
         match found {
@@ -223,36 +250,55 @@ impl Blocks {
     }
 }
 
-/// Decodes one block after the other. The library's chain of codecs makes its tables anew for every block, which takes longer
+/// Decodes one chunk after the other. The library's chain of codecs makes its tables anew for every one, which takes longer
 /// than to decode it.
-pub(crate) struct BlockDecoder {
+pub(crate) struct ChunkDecoder {
     zstd: zstd::bulk::Decompressor<'static>,
     bytes: Vec<u8>,
+}
+
+impl ChunkDecoder {
+    /// Of chunks of so many bytes.
+    pub(crate) fn new(byte_count: usize) -> Result<Self, String> {
+        let zstd = zstd::bulk::Decompressor::new();
+        Ok(Self {
+            zstd: zstd.map_err(|e| e.to_string())?,
+            bytes: vec![0; byte_count],
+        })
+    }
+
+    /// Bytes of a chunk, whose checksum is compared with what is stored first.
+    pub(crate) fn decode(&mut self, content: &[u8]) -> Result<&[u8], String> {
+        let (compressed, _told) = content
+            .split_last_chunk::<CRC_BYTES>()
+            .filter(|(own, told)| crc32c::crc32c(own) == u32::from_le_bytes(**told))
+            .ok_or("its bytes are not those of its checksum (crc32c)")?;
+        // It holds as many bytes as a chunk has, or is refused.
+        let count = self.zstd.decompress_to_buffer(compressed, &mut self.bytes);
+        if count.map_err(|e| e.to_string())? != self.bytes.len() {
+            return Err("it holds less than a chunk".to_owned());
+        }
+        Ok(&self.bytes)
+    }
+}
+
+/// Decodes one block of values after the other.
+pub(crate) struct BlockDecoder {
+    chunks: ChunkDecoder,
     values: Vec<f32>,
 }
 
 impl BlockDecoder {
     pub(crate) fn new() -> Result<Self, String> {
-        let zstd = zstd::bulk::Decompressor::new();
         Ok(Self {
-            zstd: zstd.map_err(|e| e.to_string())?,
-            bytes: vec![0; BLOCK_VALUES * size_of::<f32>()],
+            chunks: ChunkDecoder::new(BLOCK_VALUES * size_of::<f32>())?,
             values: vec![f32::NAN; BLOCK_VALUES],
         })
     }
 
-    /// Values of a block, `[cell, step]`, whose checksum is compared with its bytes first.
+    /// Values of a block, `[cell, step]`.
     pub(crate) fn decode(&mut self, content: &[u8]) -> Result<&[f32], String> {
-        let (compressed, _told) = content
-            .split_last_chunk::<CRC_BYTES>()
-            .filter(|(own, told)| crc32c::crc32c(own) == u32::from_le_bytes(**told))
-            .ok_or("its bytes are not those of its checksum (crc32c)")?;
-        // It holds as many bytes as a block has, or is refused.
-        let count = self.zstd.decompress_to_buffer(compressed, &mut self.bytes);
-        if count.map_err(|e| e.to_string())? != self.bytes.len() {
-            return Err("it holds less than a block".to_owned());
-        }
-        let (bytes, _rest) = self.bytes.as_chunks();
+        let (bytes, _rest) = self.chunks.decode(content)?.as_chunks();
         for (value, bytes) in self.values.iter_mut().zip(bytes) {
             *value = f32::from_le_bytes(*bytes);
         }

@@ -1,24 +1,30 @@
-//! The cube of a product in, its runs of steps time-major out: what is there map-major is turned, run by run.
+//! The cube of a product in, its runs of steps time-major out, and sums of them: what is there map-major is turned, run by run.
 //!
 //! Nothing waits for it, and it may be killed at any point: what was sent and not committed is removed by clean-up, and
 //! whoever publishes next goes on. Two that do the same at once send the same values, and the second finds them there.
-//! Values of one shard are held at a time: 128 MiB at most, and what is read and written of it.
+//! Values of one shard are held at a time: 128 MiB at most, sums of it, a fifth of that, and what is read and written of it.
 
 use std::sync::Arc;
 
+use bytes::Bytes;
 use contract::chunk::Window;
+use contract::digest::Digest;
 use futures::stream::{self, StreamExt as _, TryStreamExt as _};
 use icechunk::format::manifest::ChunkPayload;
 use icechunk::format::{ChunkIndices, Path};
-use icechunk::session::SessionErrorKind;
+use icechunk::session::{Session, SessionErrorKind};
+use serde_json::Map;
 use storage::Store;
+use tokio::sync::RwLock;
 use zarrs_icechunk::AsyncIcechunkStore;
 
+use crate::arrays::{self, Definition, SERIES};
 use crate::edit::ATTEMPTS;
 use crate::field::SeriesEncoder;
 use crate::layout::RUN_STEPS;
-use crate::series::{self, Runs};
+use crate::series;
 use crate::state::State;
+use crate::sums::Basis;
 use crate::{At, Cube, CubeError, Repository};
 
 /// Steps whose windows are read before they are turned: 16 values side by side fill a line of a processor's cache.
@@ -27,7 +33,17 @@ const STEPS_AT_ONCE: usize = 16;
 /// A shard that is in the store, by its row and column; none where no cell has data.
 type Shard = ([u32; 2], Option<ChunkPayload>);
 
-/// Makes the runs of the cube in a folder of a store that are not there yet, the last one if it lacks many steps; how many that were.
+/// Shards of a run.
+#[derive(Default)]
+struct Made {
+    /// Of the time-major copy; none where it is there already.
+    series: Vec<Shard>,
+    /// Of sums; none of a quantity that is not summed.
+    sums: Vec<Shard>,
+}
+
+/// Makes the runs of the cube in a folder of a store that are not there yet, and sums of them, the last one if it lacks many
+/// steps; how many that were.
 ///
 /// # Errors
 /// `Missing` if there is no cube. A chunk that is damaged or gone: no run is made of it.
@@ -36,65 +52,189 @@ pub async fn compact(store: &Store, folder: &str) -> Result<usize, CubeError> {
     let mut made = 0;
     loop {
         let cube = repository.at(&At::Newest).await?;
-        let Some(run) = cube.runs().first_missing(cube.steps()) else {
+        let Some(run) = cube.first_missing() else {
             return Ok(made);
         };
-        let shards = Compaction {
+        let compaction = Compaction {
             repository: &repository,
             cube: &cube,
             encoder: Arc::new(SeriesEncoder::new(cube.description())?),
-            path: path(&repository, &cube)?,
+            basis: cube.sums().next_basis(cube.description()),
+            run,
+            has_series: cube.runs().is_of(run, cube.steps()),
         };
-        let shards = shards.run(run).await?;
-        made += usize::from(place(&repository, &cube, run, &shards).await?);
+        let shards = compaction.shards().await?;
+        made += usize::from(compaction.place(&shards).await?);
     }
-}
-
-/// Path of the time-major array of a cube.
-fn path(repository: &Repository, cube: &Cube) -> Result<Path, CubeError> {
-    let name = crate::arrays::series(cube.description(), 1)?;
-    let path = Path::new(name.path().as_str());
-    path.map_err(|e| repository.failed("naming the series", &e))
 }
 
 struct Compaction<'a> {
     repository: &'a Repository,
     cube: &'a Cube,
     encoder: Arc<SeriesEncoder>,
-    path: Path,
+    /// How values count in sums; none of a quantity that is not summed.
+    basis: Option<Arc<Basis>>,
+    run: usize,
+    /// Is the time-major copy there, and sums alone are made?
+    has_series: bool,
 }
 
 impl Compaction<'_> {
-    /// Sends all shards of a run, one after the other.
-    async fn run(&self, run: usize) -> Result<Vec<Shard>, CubeError> {
+    /// Sends all shards of the run, one after the other.
+    async fn shards(&self) -> Result<Made, CubeError> {
         let session = self.repository.session().await?;
-        let failed = |e: &dyn std::fmt::Display| self.repository.failed("storing a series", e);
-        let held = series::steps_of(run, self.cube.steps()).len();
-        let mut shards = vec![];
+        let (series, sums) = (self.series_path()?, self.sums_path()?);
+        let mut made = Made::default();
         for shard in self.encoder.shards() {
-            let values = turned(self.cube, &self.encoder, (run, held), shard).await?;
-            let encoder = Arc::clone(&self.encoder);
-            let encoded = tokio::task::spawn_blocking(move || encoder.encode(values));
-            let Some(content) = encoded.await.map_err(|e| thread(&e))?? else {
-                shards.push((shard, None));
-                continue;
-            };
-            let index = ChunkIndices(vec![shard[0], shard[1], run as u32]);
-            let writer = session.read().await.get_chunk_writer(&self.path, &index);
-            let payload = writer.map_err(|e| failed(&e))?(content).await;
-            shards.push((shard, Some(payload.map_err(|e| failed(&e))?)));
+            let [values, records] = self.encoded(shard).await?;
+            if !self.has_series {
+                let sent = self.send(&session, &series, shard, values).await?;
+                made.series.push((shard, sent));
+            }
+            if self.basis.is_some() {
+                let sent = self.send(&session, &sums, shard, records).await?;
+                made.sums.push((shard, sent));
+            }
         }
-        Ok(shards)
+        Ok(made)
+    }
+
+    /// A shard of the time-major copy and that of sums; none where no cell has data, or where it is not made.
+    async fn encoded(&self, shard: [u32; 2]) -> Result<[Option<Bytes>; 2], CubeError> {
+        let (cube, run) = (self.cube, self.run);
+        let values = if self.has_series {
+            cube.shard(run, shard).await?
+        } else {
+            let held = series::steps_of(run, cube.steps()).len();
+            Some(turned(cube, &self.encoder, (run, held), shard).await?)
+        };
+        let Some(values) = values else {
+            return Ok([None, None]);
+        };
+        let (encoder, basis) = (Arc::clone(&self.encoder), self.basis.clone());
+        let has_series = self.has_series;
+        let encoded = tokio::task::spawn_blocking(move || {
+            let records = basis.map(|basis| encoder.records(&values, shard, &basis));
+            let records = records.map(|records| encoder.encode_records(records));
+            let values = if has_series {
+                None
+            } else {
+                encoder.encode(values)?
+            };
+            Ok([values, records.transpose()?.flatten()])
+        });
+        encoded.await.map_err(|e| thread(&e))?
+    }
+
+    async fn send(
+        &self,
+        session: &RwLock<Session>,
+        path: &Path,
+        shard: [u32; 2],
+        content: Option<Bytes>,
+    ) -> Result<Option<ChunkPayload>, CubeError> {
+        let failed = |e: &dyn std::fmt::Display| self.repository.failed("storing a series", e);
+        let Some(content) = content else {
+            return Ok(None);
+        };
+        let index = ChunkIndices(vec![shard[0], shard[1], self.run as u32]);
+        let writer = session.read().await.get_chunk_writer(path, &index);
+        let payload = writer.map_err(|e| failed(&e))?(content).await;
+        payload.map(Some).map_err(|e| failed(&e))
+    }
+
+    fn series_path(&self) -> Result<Path, CubeError> {
+        self.path(&arrays::series(self.cube.description(), 1)?)
+    }
+
+    fn sums_path(&self) -> Result<Path, CubeError> {
+        self.path(&arrays::sums(self.cube.description(), 1)?)
+    }
+
+    fn path(&self, array: &Definition) -> Result<Path, CubeError> {
+        let path = Path::new(array.path().as_str());
+        path.map_err(|e| self.repository.failed("naming the series", &e))
+    }
+
+    /// Gives shards their places, unless somebody else has placed the same, or the steps are others by now; were they placed?
+    async fn place(&self, made: &Made) -> Result<bool, CubeError> {
+        let (repository, run) = (self.repository, self.run);
+        let failed = |e: &dyn std::fmt::Display| repository.failed("placing a series", e);
+        let description = self.cube.description();
+        let held = series::steps_of(run, self.cube.steps()).len();
+        let Some(name) = series::name_of(run, self.cube.steps()) else {
+            return Ok(false);
+        };
+        for _attempt in 0..ATTEMPTS {
+            let state = State::newest(repository).await?;
+            let is_same = state.describes_same_cells(description)
+                && series::name_of_first(held, run, &state.steps) == Some(name);
+            let is_placed = if self.has_series {
+                // Sums of a run that is there no more are of no use.
+                state.runs.name(run) != Some(name) || state.sums.runs.name(run) == Some(name)
+            } else {
+                state.runs.held_count(run, &state.steps) >= held
+            };
+            if !is_same || is_placed {
+                return Ok(false);
+            }
+            self.write(&state, made, name).await?;
+            let mut session = state.session.write().await;
+            let message = format!("run {run} of the series");
+            match session.commit(message).execute().await {
+                Ok(_snapshot) => return Ok(true),
+                Err(e) if matches!(e.kind, SessionErrorKind::Conflict { .. }) => {}
+                Err(e) => return Err(failed(&e)),
+            }
+        }
+        Err(CubeError::Contended {
+            place: repository.place.clone(),
+            attempts: ATTEMPTS,
+        })
+    }
+
+    /// Writes what was made over a state.
+    async fn write(&self, state: &State, made: &Made, name: Digest) -> Result<(), CubeError> {
+        let failed = |e: &dyn std::fmt::Display| self.repository.failed("placing a series", e);
+        let (description, run) = (self.cube.description(), self.run);
+        let arrays = Arc::new(AsyncIcechunkStore::from(Arc::clone(&state.session)));
+        if !self.has_series {
+            let runs = state.runs.clone().with(run, name);
+            let array = arrays::series(description, runs.len())?;
+            runs.write(&arrays, (SERIES, Map::new()), array).await?;
+        }
+        // Those that somebody else has made meanwhile count as they say, and others cannot be put beside them.
+        let basis = self.basis.as_ref();
+        let basis = basis.filter(|own| state.sums.basis.as_ref().is_none_or(|there| there == *own));
+        if let Some(basis) = basis {
+            let runs = state.sums.runs.clone().with(run, name);
+            let (sums, session) = (&state.sums, &state.session);
+            let own = (&**basis, &runs);
+            sums.write(session, &arrays, description, own).await?;
+        }
+        let placed = [(self.series_path()?, &made.series)].into_iter();
+        let of_sums = basis.map(|_| Ok::<_, CubeError>((self.sums_path()?, &made.sums)));
+        let mut session = state.session.write().await;
+        for (path, shards) in placed.chain(of_sums.transpose()?) {
+            for ([row, col], payload) in shards {
+                let here = ChunkIndices(vec![*row, *col, run as u32]);
+                let set = session.set_chunk_ref(path.clone(), here, payload.clone());
+                set.await.map_err(|e| failed(&e))?;
+            }
+        }
+        Ok(())
     }
 }
 
-/// Does the time-major copy of a run hold the values of its steps?
+/// Does the time-major copy of a run hold the values of its steps, and are the sums of it those of these values?
 ///
 /// # Errors
 /// `Chunk` with the first shard that does not.
 pub(crate) async fn compare(cube: &Cube, run: usize) -> Result<(), CubeError> {
     let encoder = SeriesEncoder::new(cube.description())?;
     let held = cube.runs().held_count(run, cube.steps());
+    let basis = cube.sums().basis.clone();
+    let basis = basis.filter(|_| cube.is_summed(run));
     for shard in encoder.shards() {
         let told = cube.shard(run, shard).await?;
         let own = turned(cube, &encoder, (run, held), shard).await?;
@@ -105,12 +245,25 @@ pub(crate) async fn compare(cube: &Cube, run: usize) -> Result<(), CubeError> {
             }
             None => own.iter().all(|value| value.is_nan()),
         };
+        let differs = |array: Option<String>, what: &str| CubeError::Chunk {
+            array: array.unwrap_or_default(),
+            chunk: vec![shard[0].into(), shard[1].into(), run as u64],
+            reason: what.to_owned(),
+        };
         if !is_same {
-            return Err(CubeError::Chunk {
-                array: cube.series_name().unwrap_or_default(),
-                chunk: vec![shard[0].into(), shard[1].into(), run as u64],
-                reason: "its values are not those of its steps".to_owned(),
-            });
+            let what = "its values are not those of its steps";
+            return Err(differs(cube.series_name(), what));
+        }
+        let Some(basis) = &basis else { continue };
+        let told = cube.records_of_shard(run, shard).await?;
+        let own = encoder.records(&own, shard, basis);
+        let is_same = match told {
+            Some(told) => told == own,
+            None => own.iter().all(|byte| *byte == 0),
+        };
+        if !is_same {
+            let what = "its sums are not those of its steps";
+            return Err(differs(cube.sums_name(), what));
         }
     }
     Ok(())
@@ -158,47 +311,4 @@ fn turn(maps: &[Vec<f32>], window: Window, cols: usize, first: usize, turned: &m
             }
         }
     }
-}
-
-/// Commits a run over whatever state is there by now. False if it was there already, or its steps are others by now.
-async fn place(
-    repository: &Repository,
-    made_of: &Cube,
-    run: usize,
-    shards: &[Shard],
-) -> Result<bool, CubeError> {
-    let failed = |e: &dyn std::fmt::Display| repository.failed("placing a series", e);
-    let description = made_of.description();
-    let held = series::steps_of(run, made_of.steps()).len();
-    let Some(name) = series::name_of(run, made_of.steps()) else {
-        return Ok(false);
-    };
-    let path = path(repository, made_of)?;
-    for _attempt in 0..ATTEMPTS {
-        let state = State::newest(repository).await?;
-        let is_same = state.describes_same_cells(description)
-            && series::name_of_first(held, run, &state.steps) == Some(name);
-        if !is_same || state.runs.held_count(run, &state.steps) >= held {
-            return Ok(false);
-        }
-        let arrays = Arc::new(AsyncIcechunkStore::from(Arc::clone(&state.session)));
-        let runs: Runs = state.runs.clone().with(run, name);
-        runs.write(&arrays, description).await?;
-        let mut session = state.session.write().await;
-        for ([row, col], payload) in shards {
-            let here = ChunkIndices(vec![*row, *col, run as u32]);
-            let set = session.set_chunk_ref(path.clone(), here, payload.clone());
-            set.await.map_err(|e| failed(&e))?;
-        }
-        let message = format!("run {run} of the series");
-        match session.commit(message).execute().await {
-            Ok(_snapshot) => return Ok(true),
-            Err(e) if matches!(e.kind, SessionErrorKind::Conflict { .. }) => {}
-            Err(e) => return Err(failed(&e)),
-        }
-    }
-    Err(CubeError::Contended {
-        place: repository.place.clone(),
-        attempts: ATTEMPTS,
-    })
 }

@@ -7,12 +7,13 @@ use bytes::Bytes;
 use contract::chunk::Window;
 use contract::grid::Grid;
 use zarrs::array::{
-    ArrayToBytesCodecTraits as _, CodecChain, CodecOptions, FromArrayBytes as _,
-    IntoArrayBytes as _,
+    ArrayToBytesCodecTraits as _, CodecChain, CodecOptions, Element, FromArrayBytes as _,
 };
 
 use crate::arrays::{self, Definition};
 use crate::layout::RUN_STEPS;
+use crate::sums::Basis;
+use crate::summing::records;
 use crate::{CubeError, Description, Layout};
 
 /// Writes fields of one grid as objects of the layout.
@@ -79,9 +80,9 @@ impl Encoder {
 }
 
 /// Encodes the values of one object of an array, all of them.
-fn object(array: &Definition, values: Vec<f32>) -> Result<Bytes, CubeError> {
+fn object<T: Element>(array: &Definition, values: Vec<T>) -> Result<Bytes, CubeError> {
     let failed = |e: String| CubeError::library(&arrays::name(array), "encoding", e);
-    let bytes = values.into_array_bytes(array.data_type());
+    let bytes = T::into_array_bytes(array.data_type(), values);
     let bytes = bytes.map_err(|e| failed(e.to_string()))?;
     let shape = array.chunk_shape(&[0, 0, 0]);
     let shape = shape.map_err(|e| failed(e.to_string()))?;
@@ -96,9 +97,10 @@ fn object(array: &Definition, values: Vec<f32>) -> Result<Bytes, CubeError> {
     Ok(Bytes::from(encoded.into_owned()))
 }
 
-/// Writes runs of steps as shards of the time-major copy.
+/// Writes runs of steps as shards of the time-major copy, and sums of them.
 pub(crate) struct SeriesEncoder {
     definition: Definition,
+    sums: Definition,
     grid: Grid,
     /// Rows and columns of a shard, cells.
     shard: [u32; 2],
@@ -108,6 +110,7 @@ impl SeriesEncoder {
     pub(crate) fn new(description: &Description) -> Result<Self, CubeError> {
         Ok(Self {
             definition: arrays::series(description, 1)?,
+            sums: arrays::sums(description, 1)?,
             grid: description.grid,
             shard: Layout::of(&description.grid).series_object(),
         })
@@ -149,6 +152,21 @@ impl SeriesEncoder {
             return Ok(None);
         }
         object(&self.definition, values).map(Some)
+    }
+
+    /// Records of sums of a shard of `values`, `[row, col, step]`.
+    pub(crate) fn records(&self, values: &[f32], shard: [u32; 2], basis: &Basis) -> Vec<u8> {
+        let first_row = (shard[0] * self.shard[0]) as usize;
+        let weights = basis.row_weights.get(first_row..).unwrap_or_default();
+        records(values, self.shard_cols(), weights, basis.scale)
+    }
+
+    /// Encodes the records of a shard; none where no cell has data.
+    pub(crate) fn encode_records(&self, records: Vec<u8>) -> Result<Option<Bytes>, CubeError> {
+        if records.iter().all(|byte| *byte == 0) {
+            return Ok(None);
+        }
+        object(&self.sums, records).map(Some)
     }
 }
 

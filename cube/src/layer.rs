@@ -6,9 +6,10 @@ use std::sync::Arc;
 use icechunk::format::manifest::ChunkPayload;
 use icechunk::format::{ChunkIndices, Path};
 use icechunk::session::{SessionError, SessionErrorKind};
-use serde_json::Value;
+use serde_json::{Map, Value};
 use zarrs_icechunk::AsyncIcechunkStore;
 
+use crate::arrays::SERIES;
 use crate::field::SeriesEncoder;
 use crate::plan::Plan;
 use crate::staged::AllStaged;
@@ -135,24 +136,42 @@ impl Layer<'_> {
         Ok(())
     }
 
-    /// Removes the runs of the time-major copy that are of other steps than come to lie in their places.
+    /// Removes the runs of the time-major copy that are of other steps than come to lie in their places, and sums of them.
     async fn drop_runs(&self, arrays: &Arc<AsyncIcechunkStore>) -> Result<(), CubeError> {
-        let (kept, gone) = self.state.runs.kept(&self.plan.steps);
-        if gone.is_empty() && kept == self.state.runs {
-            return Ok(());
+        let (description, state) = (self.description, self.state);
+        let (kept, gone) = state.runs.kept(&self.plan.steps);
+        if !gone.is_empty() || kept != state.runs {
+            let array = arrays::series(description, state.runs.len())?;
+            self.delete(array.path().as_str(), &gone).await?;
+            let array = arrays::series(description, kept.len())?;
+            kept.write(arrays, (SERIES, Map::new()), array).await?;
         }
-        let series = arrays::series(self.description, self.state.runs.len())?;
-        let path = Path::new(series.path().as_str());
+        let Some(basis) = &state.sums.basis else {
+            return Ok(());
+        };
+        let (kept, gone) = state.sums.runs.kept(&self.plan.steps);
+        if !gone.is_empty() || kept != state.sums.runs {
+            let array = arrays::sums(description, state.sums.runs.len())?;
+            self.delete(array.path().as_str(), &gone).await?;
+            let (sums, session) = (&state.sums, &state.session);
+            let own = (&**basis, &kept);
+            sums.write(session, arrays, description, own).await?;
+        }
+        Ok(())
+    }
+
+    /// Removes all shards of some runs of an array.
+    async fn delete(&self, array: &str, runs: &[usize]) -> Result<(), CubeError> {
+        let path = Path::new(array);
         let path = path.map_err(|e| self.repository.failed("placing values", &e))?;
         let shards = SeriesEncoder::new(self.description)?.shards();
         let place =
             |run: usize| move |[row, col]: &[u32; 2]| ChunkIndices(vec![*row, *col, run as u32]);
-        let behind = gone.iter().flat_map(|run| shards.iter().map(place(*run)));
+        let behind = runs.iter().flat_map(|run| shards.iter().map(place(*run)));
         let mut session = self.state.session.write().await;
         let cut = session.delete_chunks(&path, behind.collect::<Vec<_>>());
         cut.await.map_err(|e| self.failed(&e))?;
-        drop(session);
-        kept.write(arrays, self.description).await
+        Ok(())
     }
 
     /// Gives the values their places in time: those that are there move by reference, those that were put are named.

@@ -61,6 +61,17 @@ impl ObjectStorage {
         key.map_err(|e: contract::ContractError| other(&e))
     }
 
+    /// Parts of a chunk that the repository names so, in the order of their ranges.
+    pub(crate) async fn parts(
+        &self,
+        chunk: &str,
+        ranges: &[Range<u64>],
+    ) -> Result<Vec<Bytes>, String> {
+        let path = Path::from(self.path(&format!("chunks/{chunk}")));
+        let found = self.store.object_store().get_ranges(&path, ranges).await;
+        found.map_err(|e| e.to_string())
+    }
+
     async fn read_changing(&self, name: &str) -> StorageResult<(Bytes, VersionInfo)> {
         let found = self.store.read_changing(&self.key(name)?).await;
         match found.map_err(|e| failed(&e))? {

@@ -15,8 +15,11 @@ use crate::blocks::Blocks;
 use crate::error::first_lines;
 use crate::field::Decoder;
 use crate::layout::RUN_STEPS;
+use crate::object_storage::ObjectStorage;
 use crate::series::Runs;
+use crate::sums::Sums;
 use crate::unreadable::Object;
+use crate::arrays::SERIES;
 use crate::{CubeError, Description, Layout, Step, arrays, axis};
 
 /// Chunks that are read and decoded at a time.
@@ -42,10 +45,15 @@ struct Inner {
     held: Vec<usize>,
     /// Reads them; none where there are none.
     blocks: Option<Blocks>,
+    /// Sums of blocks.
+    sums: Sums,
+    /// Reads them; none where there are none.
+    records: Option<Blocks>,
 }
 
 impl Cube {
-    pub(crate) async fn open(session: Session, place: &str) -> Result<Self, CubeError> {
+    pub(crate) async fn open(session: Session, objects: &ObjectStorage) -> Result<Self, CubeError> {
+        let place = &objects.to_string();
         let store = Arc::new(AsyncIcechunkStore::new(session));
         let description = Description::of_group(&store, place).await?;
         let steps = axis::read(&store, &description, place).await?;
@@ -59,19 +67,33 @@ impl Cube {
             });
         }
         let session = store.session();
-        let runs = Runs::read(&*session.read().await, &store, place).await?;
-        let blocks = if runs.len() == 0 {
-            None
-        } else {
-            let definition = arrays::series(&description, runs.len())?;
-            let series = axis::open(&store, &definition, place).await?;
-            Some(Blocks::new(series, &description, place))
+        let session = session.read().await;
+        let runs = Runs::read(&session, &store, SERIES, place).await?;
+        let sums = Sums::read(&session, &store, &description, place).await?;
+        drop(session);
+        let blocks = match runs.len() {
+            0 => None,
+            count => {
+                let array = arrays::series(&description, count)?;
+                let array = axis::open(&store, &array, place).await?;
+                Some(Blocks::new(array, &description, objects)?)
+            }
+        };
+        let records = match sums.runs.len() {
+            0 => None,
+            count => {
+                let array = arrays::sums(&description, count)?;
+                let array = axis::open(&store, &array, place).await?;
+                Some(Blocks::new(array, &description, objects)?)
+            }
         };
         let held = (0..runs.len()).map(|run| runs.held_count(run, &steps));
         Ok(Self(Arc::new(Inner {
             held: held.collect(),
             runs,
             blocks,
+            sums,
+            records,
             layout: Layout::of(&description.grid),
             shards: AsyncArrayShardedReadableExtCache::new(&array),
             decoder: Arc::new(Decoder::new(&description)?),
@@ -189,6 +211,70 @@ impl Cube {
             Some(own) => own.undecoded(run, block, reason).await,
             None => self.no_run(run),
         }
+    }
+
+    /// Sums of blocks.
+    pub(crate) fn sums(&self) -> &Sums {
+        &self.0.sums
+    }
+
+    /// Are there sums of the values of a run?
+    pub(crate) fn is_summed(&self, run: usize) -> bool {
+        let own = self.0.sums.runs.name(run);
+        own.is_some() && own == self.0.runs.name(run)
+    }
+
+    /// What compaction is to make next: a run of the time-major copy, and sums of it.
+    pub(crate) fn first_missing(&self) -> Option<usize> {
+        let Inner { runs, steps, .. } = &*self.0;
+        let missing = runs.first_missing(steps);
+        if self.0.sums.next_basis(&self.0.description).is_none() {
+            return missing;
+        }
+        let complete = missing.unwrap_or(usize::MAX).min(steps.len() / RUN_STEPS);
+        (0..complete).find(|run| !self.is_summed(*run)).or(missing)
+    }
+
+    /// Records of sums of a run, as they are stored.
+    pub(crate) async fn records(
+        &self,
+        run: usize,
+        blocks: &[[u32; 2]],
+    ) -> Result<Vec<Option<Bytes>>, CubeError> {
+        match &self.0.records {
+            Some(own) => own.encoded(run, blocks).await,
+            None => Err(self.no_run(run)),
+        }
+    }
+
+    /// The error of one of them that cannot be decoded.
+    pub(crate) async fn undecoded_record(
+        &self,
+        run: usize,
+        block: [u32; 2],
+        reason: &str,
+    ) -> CubeError {
+        match &self.0.records {
+            Some(own) => own.undecoded(run, block, reason).await,
+            None => self.no_run(run),
+        }
+    }
+
+    /// Records of a whole shard, `[row, col, byte]` of blocks; none where no cell has data.
+    pub(crate) async fn records_of_shard(
+        &self,
+        run: usize,
+        shard: [u32; 2],
+    ) -> Result<Option<Vec<u8>>, CubeError> {
+        match &self.0.records {
+            Some(own) => own.shard(run, shard).await,
+            None => Ok(None),
+        }
+    }
+
+    /// Name of the array of sums, if there is one.
+    pub(crate) fn sums_name(&self) -> Option<String> {
+        self.0.records.as_ref().map(Blocks::name)
     }
 
     fn no_run(&self, run: usize) -> CubeError {

@@ -29,6 +29,8 @@ const LOGGED_UPDATES: u16 = 100;
 pub struct Repository {
     pub(crate) inner: icechunk::Repository,
     pub(crate) description: Description,
+    /// Where its objects are.
+    objects: ObjectStorage,
     /// For messages.
     pub(crate) place: String,
 }
@@ -52,9 +54,9 @@ impl Repository {
         folder: &str,
         description: &Description,
     ) -> Result<Self, CubeError> {
-        let storage = ObjectStorage::new(store.clone(), folder);
-        let place = storage.to_string();
-        let made = icechunk::Repository::create(Arc::new(storage))
+        let objects = ObjectStorage::new(store.clone(), folder);
+        let place = objects.to_string();
+        let made = icechunk::Repository::create(Arc::new(objects.clone()))
             .config(config(description))
             .spec_version(SpecVersionBin::V2)
             .execute();
@@ -67,6 +69,7 @@ impl Repository {
         let repository = Self {
             inner,
             description: description.clone(),
+            objects,
             place,
         };
         let session = repository.session().await?;
@@ -107,10 +110,12 @@ impl Repository {
             }
             opened => opened?,
         };
+        let objects = ObjectStorage::new(store.clone(), folder);
         Ok(Self {
             inner,
             description: description.clone(),
-            place: ObjectStorage::new(store.clone(), folder).to_string(),
+            place: objects.to_string(),
+            objects,
         })
     }
 
@@ -147,6 +152,7 @@ impl Repository {
         Ok(Self {
             inner,
             description,
+            objects: ObjectStorage::new(store.clone(), folder),
             place,
         })
     }
@@ -191,7 +197,7 @@ impl Repository {
                 });
             }
         };
-        Cube::open(session, &self.place).await
+        Cube::open(session, &self.objects).await
     }
 
     /// Names a state for good: what cites it is answered the same ever after. Nothing is done if it has that name.

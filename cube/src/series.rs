@@ -9,13 +9,14 @@ use std::sync::Arc;
 use contract::digest::Digest;
 use icechunk::format::Path;
 use icechunk::session::{Session, SessionErrorKind};
+use serde_json::{Map, Value};
 use zarrs::group::GroupBuilder;
 use zarrs::storage::{AsyncReadableStorageTraits, AsyncWritableStorageTraits};
 
-use crate::arrays::{self, DIGEST_BYTES, DIGEST_CHUNK, SERIES};
+use crate::arrays::{self, DIGEST_BYTES, DIGEST_CHUNK, Definition};
 use crate::error::first_lines;
 use crate::layout::RUN_STEPS;
-use crate::{CubeError, Description, Step, axis};
+use crate::{CubeError, Step, axis};
 
 /// So many steps more are worth making the last run anew.
 const LEAST_NEW: usize = 16;
@@ -25,16 +26,17 @@ const LEAST_NEW: usize = 16;
 pub(crate) struct Runs(Vec<Option<Digest>>);
 
 impl Runs {
-    /// What a state of a cube has; nothing where it was never compacted.
+    /// What a state of a cube has in a group; nothing where it was never compacted.
     pub(crate) async fn read<S>(
         session: &Session,
         arrays: &Arc<S>,
+        group: &str,
         place: &str,
     ) -> Result<Self, CubeError>
     where
         S: AsyncReadableStorageTraits + 'static,
     {
-        let path = Path::new(&format!("/{SERIES}"));
+        let path = Path::new(&format!("/{group}"));
         let path = path.map_err(|e| CubeError::library(place, "naming the series", e))?;
         match session.get_node(&path).await {
             Ok(_group) => {}
@@ -43,7 +45,7 @@ impl Runs {
             }
             Err(e) => return Err(CubeError::library(place, "looking for the series", e)),
         }
-        let array = axis::open(arrays, &arrays::runs(1)?, place).await?;
+        let array = axis::open(arrays, &arrays::runs(group, 1)?, place).await?;
         let runs = array.shape()[0];
         let chunk_bytes = (DIGEST_CHUNK * DIGEST_BYTES) as usize;
         let mut bytes: Vec<u8> = vec![];
@@ -75,6 +77,11 @@ impl Runs {
         self.0.len()
     }
 
+    /// Of which steps one was made; none where it is not there.
+    pub(crate) fn name(&self, run: usize) -> Option<Digest> {
+        self.0.get(run).copied().flatten()
+    }
+
     /// Those that are there, and what each was made of.
     pub(crate) fn made_of(&self) -> impl Iterator<Item = (usize, Digest)> {
         let names = self.0.iter().enumerate();
@@ -84,7 +91,7 @@ impl Runs {
     /// How many of the steps in its place a run holds, the first ones: all of them, those that there were when it was made,
     /// or none since they are others by now.
     pub(crate) fn held_count(&self, run: usize, steps: &[Step]) -> usize {
-        let Some(name) = self.0.get(run).copied().flatten() else {
+        let Some(name) = self.name(run) else {
             return 0;
         };
         let all = steps_of(run, steps).len();
@@ -94,7 +101,7 @@ impl Runs {
 
     /// Does a run hold all steps that are in its place?
     pub(crate) fn is_of(&self, run: usize, steps: &[Step]) -> bool {
-        let own = self.0.get(run).copied().flatten();
+        let own = self.name(run);
         own.is_some() && own == name_of(run, steps)
     }
 
@@ -131,25 +138,27 @@ impl Runs {
         self
     }
 
-    /// Writes the group, its arrays and which runs there are.
+    /// Writes a group with its attributes, the array that runs are in, and which there are.
     pub(crate) async fn write<S>(
         &self,
         store: &Arc<S>,
-        description: &Description,
+        (name, attributes): (&str, Map<String, Value>),
+        array: Definition,
     ) -> Result<(), CubeError>
     where
         S: AsyncWritableStorageTraits + 'static,
     {
-        let failed = |e: String| CubeError::library(SERIES, "writing", e);
-        let group = GroupBuilder::new().build(Arc::clone(store), &format!("/{SERIES}"));
+        let failed = |e: String| CubeError::library(name, "writing", e);
+        let mut group = GroupBuilder::new();
+        group.attributes(attributes);
+        let group = group.build(Arc::clone(store), &format!("/{name}"));
         let group = group.map_err(|e| failed(e.to_string()))?;
         let stored = group.async_store_metadata().await;
         stored.map_err(|e| failed(e.to_string()))?;
-        let series = arrays::series(description, self.len())?;
-        let series = series.with_storage(Arc::clone(store));
-        let stored = series.async_store_metadata().await;
+        let array = array.with_storage(Arc::clone(store));
+        let stored = array.async_store_metadata().await;
         stored.map_err(|e| failed(e.to_string()))?;
-        let array = arrays::runs(self.len())?.with_storage(Arc::clone(store));
+        let array = arrays::runs(name, self.len())?.with_storage(Arc::clone(store));
         let stored = array.async_store_metadata().await;
         stored.map_err(|e| failed(e.to_string()))?;
         for (chunk, names) in self.0.chunks(DIGEST_CHUNK as usize).enumerate() {

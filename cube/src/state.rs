@@ -7,7 +7,9 @@ use icechunk::session::{Session, SessionErrorKind};
 use tokio::sync::RwLock;
 use zarrs_icechunk::AsyncIcechunkStore;
 
+use crate::arrays::SERIES;
 use crate::series::Runs;
+use crate::sums::Sums;
 use crate::{CubeError, Description, Repository, Step, axis};
 
 /// What is there, and a session that changes it.
@@ -20,6 +22,8 @@ pub(crate) struct State {
     pub(crate) steps: Vec<Step>,
     /// Runs of the time-major copy.
     pub(crate) runs: Runs,
+    /// Sums of blocks.
+    pub(crate) sums: Sums,
 }
 
 impl State {
@@ -32,14 +36,17 @@ impl State {
             Err(e) => return Err(repository.failed("reading the newest state", &e)),
         };
         let snapshot = session.read().await.snapshot_id().to_string();
-        let (description, steps, runs) = if is_empty {
-            (None, vec![], Runs::default())
+        let (description, steps, runs, sums) = if is_empty {
+            (None, vec![], Runs::default(), Sums::default())
         } else {
             let arrays = Arc::new(AsyncIcechunkStore::from(Arc::clone(&session)));
             let description = Description::of_group(&arrays, &repository.place).await?;
             let steps = axis::read(&arrays, &description, &repository.place).await?;
-            let runs = Runs::read(&*session.read().await, &arrays, &repository.place).await?;
-            (Some(description), steps, runs)
+            let own = session.read().await;
+            let runs = Runs::read(&own, &arrays, SERIES, &repository.place).await?;
+            let sums = Sums::read(&own, &arrays, &description, &repository.place).await?;
+            drop(own);
+            (Some(description), steps, runs, sums)
         };
         Ok(Self {
             session,
@@ -47,6 +54,7 @@ impl State {
             description,
             steps,
             runs,
+            sums,
         })
     }
 

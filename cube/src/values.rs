@@ -129,7 +129,7 @@ pub struct EncodedBlocks {
 
 /// A block that cannot be decoded: its place among those asked for, and why.
 #[derive(Debug)]
-pub struct Undecoded(usize, String);
+pub struct Undecoded(pub(crate) usize, pub(crate) String);
 
 impl EncodedBlocks {
     /// Where the steps that were asked for lie in the run.
@@ -311,13 +311,9 @@ impl Values {
         if steps.start > steps.end || steps.end > self.0.places.len() {
             return Err(self.outside(&format!("steps {steps:?}")));
         }
-        let reads = self.reads(&steps);
-        let is_all = reads.maps.is_empty() && reads.fields.is_empty();
-        let mut runs = reads.runs.into_iter();
-        let (Some(((cube, run), pieces)), None, true) = (runs.next(), runs.next(), is_all) else {
+        let Some((cube, run, pieces)) = self.run_of(&steps) else {
             return Ok(None);
         };
-        let cube = self.0.cubes[cube].clone();
         let content = cube.encoded(run, blocks).await?;
         Ok(Some(EncodedBlocks {
             cube,
@@ -326,6 +322,20 @@ impl Values {
             content,
             pieces,
         }))
+    }
+
+    /// The one run that holds all of these steps, and where; none where several do, or none.
+    pub(crate) fn run_of(&self, steps: &Range<usize>) -> Option<(Cube, usize, Vec<Piece>)> {
+        if steps.start > steps.end || steps.end > self.0.places.len() {
+            return None;
+        }
+        let reads = self.reads(steps);
+        let is_all = reads.maps.is_empty() && reads.fields.is_empty();
+        let mut runs = reads.runs.into_iter();
+        let (Some(((cube, run), pieces)), None, true) = (runs.next(), runs.next(), is_all) else {
+            return None;
+        };
+        Some((self.0.cubes[cube].clone(), run, pieces))
     }
 
     fn outside(&self, what: &str) -> CubeError {

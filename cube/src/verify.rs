@@ -1,5 +1,5 @@
 //! The cube of a product in, what is wrong with it out: every version opened, every step compared with its digest, every
-//! run of its time-major copy with its steps, every chunk that is damaged or gone told by the array and the place it has there.
+//! run of its time-major copy and the sums of it with its steps, every chunk that is damaged or gone told by the array and the place it has there.
 //!
 //! Objects themselves are compared with their checksums and seals by `storage::verify`, as those of all kinds are.
 
@@ -254,7 +254,7 @@ impl Check<'_> {
             }
             if array == cube.array_name() {
                 broken.steps.extend(index.first());
-            } else if cube.series_name().as_deref() == Some(array) {
+            } else if [cube.series_name(), cube.sums_name()].contains(&Some(array.to_owned())) {
                 broken.runs.extend(index.last());
             }
             let place = format!("chunk {index:?} of {array} in {shown}");

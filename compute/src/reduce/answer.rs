@@ -10,12 +10,12 @@ use contract::statistics::{
 };
 use contract::time::Period;
 use cube::Values;
+use cube::scale::Scale;
 
 use super::accumulator::{Accumulated, too_large};
 use super::bins::{BinSums, bin_sums};
 use super::percentiles::Searches;
 use super::run::{opened, run};
-use super::scale::Scale;
 use super::task::{Question, Wanted};
 use super::tasks::Version;
 use super::weighed::Weighed;
@@ -56,8 +56,7 @@ pub async fn statistics_of(
         Some(own) => own,
         None => asked.own_scale().await?,
     };
-    let with_squares = query.statistics.iter().any(|one| one == Statistic::Std);
-    let sums = asked.accumulated(Wanted::Sums { with_squares }).await?;
+    let sums = asked.accumulated(wanted(query)).await?;
     let bins = bin_sums(&periods, &bins, &sums).ok_or_else(too_large)?;
     let percentiles = asked.percentiles(query, &bins, &periods).await?;
     let rows = Rows {
@@ -71,6 +70,23 @@ pub async fn statistics_of(
     let rows = bins.iter().enumerate().map(|(at, bin)| rows.row(at, bin));
     let rows: Vec<StatisticsRow> = rows.collect();
     Ok(answer((manifest, id), query, weighed, rows))
+}
+
+/// Which sums are asked for.
+fn wanted(query: &StatisticsQuery) -> Wanted {
+    let of_extremes = |one: Statistic| match one {
+        // Percentiles are looked for between them.
+        Statistic::Min | Statistic::Max | Statistic::Median | Statistic::Percentile(_) => true,
+        Statistic::Mean
+        | Statistic::Sum
+        | Statistic::Std
+        | Statistic::Count
+        | Statistic::Coverage => false,
+    };
+    Wanted::Sums {
+        with_squares: query.statistics.iter().any(|one| one == Statistic::Std),
+        with_extremes: query.statistics.iter().any(of_extremes),
+    }
 }
 
 fn answer(
@@ -163,7 +179,8 @@ impl Asked<'_> {
         };
         let known = self.engine.objects().remembered();
         let (mut all, mut pieces, mut new) = (Accumulated::default(), vec![], vec![]);
-        for run in version.runs(self.steps.clone(), &weighed.cells()) {
+        let stored = question.in_stored_sums();
+        for run in version.runs(self.steps.clone(), &weighed.cells(), stored) {
             let name = run.name.and_then(|name| question.sums_name(&name));
             if let Some(sums) = name.and_then(|name| known.get(&name)) {
                 let first = run.steps.start;
@@ -188,8 +205,11 @@ impl Asked<'_> {
 
     /// The scale of the values that there are, of a quantity that says nothing of them.
     async fn own_scale(&self) -> Result<Scale, ComputeError> {
-        let with_squares = false;
-        let found = self.accumulated(Wanted::Sums { with_squares }).await?;
+        let wanted = Wanted::Sums {
+            with_squares: false,
+            with_extremes: true,
+        };
+        let found = self.accumulated(wanted).await?;
         let range = (f32::INFINITY, f32::NEG_INFINITY);
         let (low, high) = found.steps.values().fold(range, |(low, high), sums| {
             (low.min(sums.min), high.max(sums.max))

@@ -6,58 +6,29 @@ use contract::chunk::{CHUNK_COLS, CHUNK_ROWS, Window, field_chunks};
 use contract::earth::Earth;
 use contract::grid::Grid;
 use cube::BLOCK_CELLS;
-use serde::{Deserialize, Serialize};
+use cube::weight_unit::{WeightUnit, largest_cell_m2};
 
 use super::region_sums::CellArea;
-use super::scale::nearest;
 use crate::budget::bands::band_of;
 use crate::region::loaded::RegionWeights;
 
-/// Steps of the largest weight, as a power of two: a share of 1e-11 of a cell is told.
-const WEIGHT_BITS: i32 = 36;
 /// Shares of a cell below this are counted in steps of their own largest one: a sliver in one cell has a mean too.
 const SLIVER: f64 = 1.0 / 65_536.0;
 
-/// Size of a step of weight: a power of two of m², m, or shares of a place.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub(super) struct WeightUnit(i32);
+/// That of areas: of the grid's largest cell, so that whole cells have the same weight in every region.
+pub(super) fn unit_of_areas(grid: &Grid, earth: Earth, weights: &RegionWeights) -> WeightUnit {
+    let cell_m2 = largest_cell_m2(grid, earth);
+    let largest = largest(weights);
+    WeightUnit::of(if largest < cell_m2 * SLIVER {
+        largest
+    } else {
+        cell_m2
+    })
+}
 
-impl WeightUnit {
-    /// That of areas: of the grid's largest cell, so that whole cells have the same weight in every region.
-    pub(super) fn of_areas(grid: &Grid, earth: Earth, weights: &RegionWeights) -> Self {
-        let areas = (0..grid.rows).map(|row| grid.cell_area_m2(row, earth));
-        let cell_m2 = areas.fold(0.0, f64::max);
-        let largest = largest(weights);
-        Self::of(if largest < cell_m2 * SLIVER {
-            largest
-        } else {
-            cell_m2
-        })
-    }
-
-    /// That of other weights: of the largest.
-    pub(super) fn of_largest(weights: &RegionWeights) -> Self {
-        Self::of(largest(weights))
-    }
-
-    fn of(largest: f64) -> Self {
-        Self(largest.log2().floor() as i32 - WEIGHT_BITS)
-    }
-
-    /// What a step is.
-    pub(super) fn size(self) -> f64 {
-        f64::from(self.0).exp2()
-    }
-
-    /// The nearest number of steps, but at least one of what there is.
-    fn steps(self, weight: f64) -> i64 {
-        if weight > 0.0 {
-            // A power of two: to multiply with the reciprocal is as exact.
-            nearest(weight * (1.0 / self.size())).max(1)
-        } else {
-            0
-        }
-    }
+/// That of other weights: of the largest.
+pub(super) fn unit_of_largest(weights: &RegionWeights) -> WeightUnit {
+    WeightUnit::of(largest(weights))
 }
 
 fn largest(weights: &RegionWeights) -> f64 {
@@ -229,7 +200,7 @@ mod tests {
             shape,
             whole: &whole,
             covered: &covered,
-            unit: WeightUnit::of_largest(&whole),
+            unit: unit_of_largest(&whole),
         };
         let step = cells.unit.size();
         for window in blocks(shape).into_iter().chain(chunks(shape)) {
@@ -247,9 +218,9 @@ mod tests {
     #[test]
     fn what_is_hardly_there_has_weight() {
         let weights = RegionWeights::new(vec![(0, vec![1e9, 1e-9, 0.0])]);
-        let unit = WeightUnit::of_largest(&weights);
+        let unit = unit_of_largest(&weights);
         assert_eq!(unit.steps(1e-9), 1);
         assert_eq!(unit.steps(0.0), 0);
-        assert!(unit.steps(1e9) >= 1 << WEIGHT_BITS);
+        assert!(unit.steps(1e9) >= 1 << cube::weight_unit::WEIGHT_BITS);
     }
 }

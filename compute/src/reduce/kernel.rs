@@ -3,11 +3,11 @@
 use std::ops::Range;
 
 use cube::BLOCK_CELLS;
+use cube::scale::Scale;
 
 use super::accumulator::StepSums;
 use super::cells::CellWeight;
 use super::histogram::{Buckets, Histograms};
-use super::scale::{Scale, nearest};
 use super::values::Values;
 use crate::budget::fixed::OutOfRange;
 
@@ -42,13 +42,12 @@ impl Equal {
     /// Adds a cell's run of steps.
     fn add(&mut self, values: &[f32], scale: Scale, with_squares: bool) {
         self.cell_count += 1;
-        let (zero, factor) = (scale.zero, scale.steps_per_value());
         let own = self.counts.iter_mut().zip(&mut self.sums);
         for ((count, sum), value) in own.zip(values) {
             let is_there = !value.is_nan();
-            let steps = (f64::from(*value) - zero) * factor;
+            let steps = scale.steps(*value);
             // What is beyond anything physical is found when the extremes are looked at.
-            *sum = sum.wrapping_add(nearest(if is_there { steps } else { 0.0 }));
+            *sum = sum.wrapping_add(if is_there { steps } else { 0 });
             *count += i64::from(is_there);
         }
         for ((min, max), value) in self.mins.iter_mut().zip(&mut self.maxs).zip(values) {
@@ -56,11 +55,9 @@ impl Equal {
             *max = if *value > *max { *value } else { *max };
         }
         if with_squares {
-            let to_squares = Scale::squares_per_step();
             for (sum, value) in self.squares.iter_mut().zip(values) {
-                let steps = (f64::from(*value) - zero) * factor;
-                let square = steps * steps * to_squares;
-                *sum = sum.wrapping_add(nearest(if value.is_nan() { 0.0 } else { square }));
+                let square = scale.square_steps(*value);
+                *sum = sum.wrapping_add(if value.is_nan() { 0 } else { square });
             }
         }
     }

@@ -3,11 +3,12 @@
 use std::sync::Arc;
 
 use contract::manifest::{Manifest, Step};
+use cube::scale::Scale;
+use cube::weight_unit::WeightUnit;
 
-use super::cells::{Cells, WeightUnit};
+use super::cells::Cells;
 use super::region_sums::RegionStepSums;
 use super::run::{opened, run};
-use super::scale::Scale;
 use super::task::{Question, Wanted};
 use super::tasks::Version;
 use crate::budget::Measure;
@@ -74,7 +75,7 @@ pub(crate) async fn sums_over_region(
     // Runs are read whole: what is asked for in pieces is summed in pieces, or a step would count twice.
     for together in at.chunk_by(|before, next| before + 1 == *next) {
         let asked = together[0] as u32..together[0] as u32 + together.len() as u32;
-        let pieces = version.runs(asked.clone(), &cells).into_iter();
+        let pieces = version.runs(asked.clone(), &cells, None).into_iter();
         let pieces = pieces.flat_map(|run| run.pieces).collect();
         let found = run(engine, question.clone(), values.clone(), pieces).await?;
         let mut found = found.regions;

@@ -1,6 +1,6 @@
 //! A piece of a question: some blocks of a run of steps, or chunks of a field, read, reduced and forgotten.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -9,17 +9,20 @@ use contract::digest::Digest;
 use contract::grid::Grid;
 use contract::key::ObjectKey;
 use contract::time::Period;
-use cube::{BLOCK_CELLS, EncodedBlocks, RUN_STEPS, Undecoded};
+use cube::scale::Scale;
+use cube::weight_unit::WeightUnit;
+use cube::{BLOCK_CELLS, EncodedBlocks, EncodedSums, RUN_STEPS, Undecoded};
 use serde::{Deserialize, Serialize};
 use storage::rows::Stored;
 use storage::{StorageError, fields};
 
 use super::accumulator::{Accumulated, too_large};
-use super::cells::{self, CellWeight, Cells, Shape, WeightUnit, block};
+use super::cells::{self, CellWeight, Cells, Shape, block};
 use super::histogram::Buckets;
+use super::inside::InsideRun;
 use super::kernel::{Summing, Target, add_weights};
 use super::region_sums::{CellArea, RegionScratch, RegionStepSums};
-use super::scale::Scale;
+use super::stored::{Stored as StoredSums, Terms};
 use super::values::Values;
 use crate::ComputeError;
 use crate::budget::Measure;
@@ -44,11 +47,24 @@ pub(super) struct Question {
 impl Question {
     /// What the sums of all steps of a run are remembered by, `run` being what names its values; none of what is no sum.
     pub(super) fn sums_name(&self, run: &Digest) -> Option<Digest> {
-        let Wanted::Sums { with_squares } = self.wanted else {
+        let Wanted::Sums {
+            with_squares,
+            with_extremes,
+        } = self.wanted
+        else {
             return None;
         };
         let weights = (self.shape, &self.whole, &self.covered, self.unit);
-        Some(Digest::of_json(&(run, weights, self.scale, with_squares)))
+        let wanted = (with_squares, with_extremes);
+        Some(Digest::of_json(&(run, weights, self.scale, wanted)))
+    }
+
+    /// How values count in stored sums that it can be answered from, if it can be from any: they know no extremes.
+    pub(super) fn in_stored_sums(&self) -> Option<Scale> {
+        match self.wanted {
+            Wanted::Sums { with_extremes, .. } => (!with_extremes).then_some(self.scale),
+            Wanted::Histograms { .. } | Wanted::RegionSums { .. } => None,
+        }
     }
 }
 
@@ -60,6 +76,8 @@ pub(super) enum Wanted {
     Sums {
         /// Those of squares too.
         with_squares: bool,
+        /// The smallest and the largest value too.
+        with_extremes: bool,
     },
     /// Weights by ranges of values.
     Histograms {
@@ -90,6 +108,8 @@ pub(super) struct Piece {
     pub(super) steps: Range<u32>,
     /// Numbers of blocks or chunks, increasing.
     pub(super) rows: Vec<u32>,
+    /// Blocks whose stored sums are read.
+    pub(super) inside: Vec<InsideRun>,
 }
 
 /// How values lie where they are read.
@@ -98,6 +118,8 @@ pub(super) struct Piece {
 pub(super) enum Layout {
     /// Time-major: a row a block, `[cell, step]`. Only a process that has opened the version reads it.
     Blocks,
+    /// Stored sums of blocks. Only a process that has opened the version reads them.
+    Sums,
     /// A row a chunk of one step.
     Field(Period),
 }
@@ -174,8 +196,10 @@ impl Worker {
     /// # Errors
     /// They cannot be read, are damaged, or beyond anything physical.
     pub(super) async fn reduce(&self, piece: Piece) -> Result<Accumulated, ComputeError> {
-        if piece.layout == Layout::Blocks {
-            return self.blocks(piece).await;
+        match piece.layout {
+            Layout::Blocks => return self.blocks(piece).await,
+            Layout::Sums => return self.stored(piece).await,
+            Layout::Field(_) => {}
         }
         let stored = self.objects.stored(&piece.key, &piece.address)?;
         let piece = Arc::new(piece);
@@ -231,6 +255,82 @@ impl Worker {
         match reduced.map_err(|e| ComputeError::inconsistent("statistics", e))? {
             Ok(reduced) => reduced,
             Err(undecoded) => Err(encoded.error(undecoded).await.into()),
+        }
+    }
+
+    /// Reads stored sums of blocks, and the values of those that could not be summed.
+    async fn stored(&self, piece: Piece) -> Result<Accumulated, ComputeError> {
+        let not_opened = || ComputeError::inconsistent(piece.key.as_str(), NOT_OPENED);
+        let [start, end] =
+            [piece.steps.start, piece.steps.end].map(|step| (piece.first_step + step) as usize);
+        let values = self.values.clone().ok_or_else(not_opened)?;
+        let basis = values.summed_as(&(start..end)).ok_or_else(not_opened)?;
+        let across = self.question.shape[1].div_ceil(BLOCK_CELLS);
+        let terms = Arc::new(Terms::of(&piece.inside, across, basis.shard_cols));
+        let places = terms.blocks().map(|block| [block / across, block % across]);
+        let places: Vec<[u32; 2]> = places.collect();
+        let encoded = values.sums(&places, start..end).await?;
+        let encoded = Arc::new(encoded.ok_or_else(not_opened)?);
+        let (worker, piece) = (self.clone(), Arc::new(piece));
+        let (own, of) = (Arc::clone(&encoded), Arc::clone(&piece));
+        let reduced = tokio::task::spawn_blocking(move || worker.reduced_sums(&of, &terms, &own));
+        let reduced = reduced.await;
+        let (mut all, rest) =
+            match reduced.map_err(|e| ComputeError::inconsistent("statistics", e))? {
+                Ok(reduced) => reduced,
+                Err(undecoded) => return Err(encoded.error(undecoded).await.into()),
+            };
+        if !rest.is_empty() {
+            let runs = rest.iter().map(|run| &piece.inside[*run]);
+            let rest = Piece {
+                layout: Layout::Blocks,
+                rows: runs.flat_map(|run| run.first..=run.last).collect(),
+                inside: vec![],
+                ..Piece::clone(&piece)
+            };
+            all.merge(self.blocks(rest).await?)?;
+        }
+        Ok(all)
+    }
+
+    /// Sums of records as they are decoded, and the runs of blocks whose values are to be read.
+    fn reduced_sums(
+        &self,
+        piece: &Piece,
+        terms: &Terms,
+        records: &EncodedSums,
+    ) -> Result<(Accumulated, BTreeSet<usize>), Undecoded> {
+        let windows = cells::blocks(self.question.shape);
+        let with_squares = matches!(
+            self.question.wanted,
+            Wanted::Sums {
+                with_squares: true,
+                ..
+            }
+        );
+        let mut stored = StoredSums::new(terms, records.pieces(), with_squares);
+        records.each(|term, record| {
+            let weights = |number: u32| {
+                let window = windows[number as usize];
+                block(self.cells().window(window), window)
+            };
+            stored.add(term, record, weights);
+            true
+        })?;
+        let (sums, rest) = stored.finish();
+        let mut all = Accumulated::default();
+        let first = piece.first_step + piece.steps.start;
+        let own = (first..).zip(sums).filter(|(_, sums)| sums.count > 0);
+        all.steps.extend(own);
+        Ok((all, rest))
+    }
+
+    fn cells(&self) -> Cells<'_> {
+        Cells {
+            shape: self.question.shape,
+            whole: &self.whole,
+            covered: &self.covered,
+            unit: self.question.unit,
         }
     }
 
@@ -300,7 +400,7 @@ impl Worker {
         };
         match (piece.layout, &self.values) {
             (Layout::Field(period), _) => vec![measure.seconds(period)],
-            (Layout::Blocks, Some(values)) => {
+            (Layout::Blocks | Layout::Sums, Some(values)) => {
                 let first = piece.first_step as usize;
                 let all = first + piece.steps.start as usize..first + piece.steps.end as usize;
                 let steps = &values.manifest().steps[all];
@@ -309,18 +409,13 @@ impl Worker {
                     .map(|step| measure.seconds(step.period))
                     .collect()
             }
-            (Layout::Blocks, None) => vec![],
+            (Layout::Blocks | Layout::Sums, None) => vec![],
         }
     }
 
     /// What the cells of a window have of the geometry, of a block as of 8 x 8 cells wherever the grid ends.
     fn cells_of(&self, window: Window, is_block: bool) -> CellShares {
-        let cells = Cells {
-            shape: self.question.shape,
-            whole: &self.whole,
-            covered: &self.covered,
-            unit: self.question.unit,
-        };
+        let cells = self.cells();
         match &self.question.wanted {
             Wanted::RegionSums { grid, .. } => {
                 let areas = cells.areas(window, grid);
@@ -366,7 +461,7 @@ impl<'a> Reduction<'a> {
         let is_of_region = matches!(worker.question.wanted, Wanted::RegionSums { .. });
         let steps = piece.steps.len();
         let sums = match worker.question.wanted {
-            Wanted::Sums { with_squares } => {
+            Wanted::Sums { with_squares, .. } => {
                 Some(Summing::new(steps, worker.question.scale, with_squares))
             }
             Wanted::Histograms { .. } | Wanted::RegionSums { .. } => None,
@@ -422,7 +517,19 @@ impl<'a> Reduction<'a> {
         if let Some(sums) = self.sums {
             let sums = sums.finish();
             let sums = sums.map_err(|e| ComputeError::inconsistent(self.piece.key.as_str(), e))?;
-            let own = (first..).zip(sums);
+            let with_extremes = matches!(
+                self.question.wanted,
+                Wanted::Sums {
+                    with_extremes: true,
+                    ..
+                }
+            );
+            // Stored sums know none: those of the rest would be some of all.
+            let own = sums.into_iter().map(|own| match with_extremes {
+                true => own,
+                false => own.without_extremes(),
+            });
+            let own = (first..).zip(own);
             self.all
                 .steps
                 .extend(own.filter(|(_, sums)| sums.count > 0));

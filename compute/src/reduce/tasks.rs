@@ -2,20 +2,27 @@
 //! where few of its steps are asked for, or where the version is not opened or not time-major yet.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use contract::chunk::{CHUNK_COLS, CHUNK_ROWS};
 use contract::digest::Digest;
 use contract::manifest::{Manifest, ManifestId};
-use cube::{BLOCK_CELLS, Values};
+use cube::scale::Scale;
+use cube::{BLOCK_CELLS, Basis, Values};
 use storage::Store;
 
 use super::cells::Cells;
+use super::inside::{Inside, InsideRun};
 use super::task::{Layout, Piece};
 
 /// Values that a piece holds at once, bytes before compression.
 const PIECE_BYTES: u64 = 8 << 20;
 /// What it costs to open one more file, in bytes read.
 const OPEN_BYTES: u64 = 64 << 10;
+/// Bytes of a record of sums, before compression.
+const RECORD_BYTES: u64 = 6 << 10;
+/// Runs of blocks whose sums a piece holds at once: some of each piece of the region.
+const SUMS_AT_ONCE: usize = 512;
 const VALUE_BYTES: u64 = size_of::<f32>() as u64;
 
 /// What is read of a run of steps.
@@ -38,9 +45,15 @@ pub(super) struct Version<'a> {
 }
 
 impl Version<'_> {
-    /// Runs that hold all values of the steps `steps` where `cells` have weight.
-    pub(super) fn runs(&self, steps: Range<u32>, cells: &Cells<'_>) -> Vec<Run> {
-        let blocks = cells.blocks();
+    /// Runs that hold all values of the steps `steps` where `cells` have weight. Where `stored` says how values count and sums are
+    /// stored that count them so, these stand for blocks inside.
+    pub(super) fn runs(
+        &self,
+        steps: Range<u32>,
+        cells: &Cells<'_>,
+        stored: Option<Scale>,
+    ) -> Vec<Run> {
+        let mut parts = Parts::new(cells, stored);
         let chunks: Vec<u32> = cells.whole.chunks().map(|(chunk, _)| chunk).collect();
         let fields = |steps: Range<u32>| Run {
             name: None,
@@ -53,8 +66,13 @@ impl Version<'_> {
         for run in time_major {
             let run = run.start as u32..run.end as u32;
             let wanted = steps.start.max(run.start)..steps.end.min(run.end);
-            let is_less = are_fields_less(&run, wanted.len(), blocks.len(), chunks.len());
-            if wanted.is_empty() || is_less {
+            if wanted.is_empty() {
+                continue;
+            }
+            let inside = parts.of(self.values.and_then(|values| {
+                values.summed_as(&(run.start as usize..run.end as usize))
+            }));
+            if are_fields_less(&run, wanted.len(), inside.read_counts(), chunks.len()) {
                 continue;
             }
             if next < wanted.start {
@@ -63,7 +81,7 @@ impl Version<'_> {
             next = wanted.end;
             runs.push(Run {
                 name: Some(Digest::of_json(&(self.id, &run))),
-                pieces: self.blocks(&run, &blocks),
+                pieces: self.pieces(&run, inside),
                 steps: run,
             });
         }
@@ -73,17 +91,23 @@ impl Version<'_> {
         runs
     }
 
-    fn blocks(&self, run: &Range<u32>, blocks: &[u32]) -> Vec<Piece> {
-        let at_once = (PIECE_BYTES / block_bytes(run)).max(1) as usize;
-        let piece = |rows: &[u32]| Piece {
+    /// Pieces of a run of steps: blocks of values, and stored sums.
+    fn pieces(&self, run: &Range<u32>, inside: &Inside) -> Vec<Piece> {
+        let piece = |layout: Layout, rows: &[u32], inside: &[InsideRun]| Piece {
             key: self.manifest.steps[run.start as usize].field.clone(),
             address: String::new(),
-            layout: Layout::Blocks,
+            layout,
             first_step: run.start,
             steps: 0..run.end - run.start,
             rows: rows.to_vec(),
+            inside: inside.to_vec(),
         };
-        blocks.chunks(at_once).map(piece).collect()
+        let at_once = (PIECE_BYTES / block_bytes(run)).max(1) as usize;
+        let blocks = inside.rim.chunks(at_once);
+        let blocks = blocks.map(|rows| piece(Layout::Blocks, rows, &[]));
+        let sums = inside.runs.chunks(SUMS_AT_ONCE);
+        let sums = sums.map(|inside| piece(Layout::Sums, &[], inside));
+        blocks.chain(sums).collect()
     }
 
     fn fields(&self, steps: Range<u32>, chunks: &[u32]) -> impl Iterator<Item = Piece> {
@@ -96,8 +120,51 @@ impl Version<'_> {
                 first_step: at,
                 steps: 0..1,
                 rows: chunks.to_vec(),
+                inside: vec![],
             }
         })
+    }
+}
+
+/// A geometry's blocks, parted by the sums that are stored: mostly the same for all runs of steps.
+struct Parts<'a> {
+    cells: &'a Cells<'a>,
+    blocks: Vec<u32>,
+    /// How values count; none where sums are not asked for.
+    stored: Option<Scale>,
+    basis: Option<Arc<Basis>>,
+    inside: Inside,
+}
+
+impl<'a> Parts<'a> {
+    fn new(cells: &'a Cells<'a>, stored: Option<Scale>) -> Self {
+        let blocks = cells.blocks();
+        Self {
+            inside: Inside {
+                runs: vec![],
+                rim: blocks.clone(),
+            },
+            cells,
+            blocks,
+            stored,
+            basis: None,
+        }
+    }
+
+    /// The parts where sums are stored that count values so.
+    fn of(&mut self, basis: Option<Arc<Basis>>) -> &Inside {
+        let basis = basis.filter(|own| Some(own.scale) == self.stored);
+        if basis != self.basis {
+            self.inside = match &basis {
+                Some(basis) => Inside::of(self.cells, &self.blocks, basis),
+                None => Inside {
+                    runs: vec![],
+                    rim: self.blocks.clone(),
+                },
+            };
+            self.basis = basis;
+        }
+        &self.inside
     }
 }
 
@@ -110,10 +177,11 @@ fn block_bytes(run: &Range<u32>) -> u64 {
 fn are_fields_less(
     run: &Range<u32>,
     wanted: usize,
-    block_count: usize,
+    [record_count, block_count]: [usize; 2],
     chunk_count: usize,
 ) -> bool {
-    let blocks = block_count as u64 * block_bytes(run) + OPEN_BYTES;
+    let records = record_count as u64 * RECORD_BYTES;
+    let blocks = block_count as u64 * block_bytes(run) + records + OPEN_BYTES;
     let chunk_bytes = u64::from(CHUNK_ROWS * CHUNK_COLS) * VALUE_BYTES;
     let fields = wanted as u64 * (chunk_count as u64 * chunk_bytes + OPEN_BYTES);
     fields < blocks

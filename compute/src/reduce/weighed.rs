@@ -7,8 +7,9 @@ use contract::geometry::Geometry;
 use contract::manifest::Manifest;
 use contract::region::{Cells as CountedCells, Region};
 use contract::statistics::StatisticsQuery;
+use cube::weight_unit::WeightUnit;
 
-use super::cells::{Cells, Shape, WeightUnit};
+use super::cells::{Cells, Shape, unit_of_areas, unit_of_largest};
 use crate::budget::over_region::{AskedArea, extent_of, weights, with_shares};
 
 use crate::region::computed::ComputedWeights;
@@ -85,7 +86,7 @@ impl Weighed {
             loaded(engine, &address.all).await?,
             loaded(engine, &address.ocean).await?,
         );
-        let unit = WeightUnit::of_areas(&manifest.grid, query.earth, &whole);
+        let unit = unit_of_areas(&manifest.grid, query.earth, &whole);
         if query.ocean.is_some() {
             extent = with_shares(extent, total(&whole), total(&sea));
         }
@@ -145,7 +146,7 @@ impl Weighed {
         Ok(Self {
             shape: [manifest.grid.rows, manifest.grid.cols],
             addresses: [address.clone(), address],
-            unit: WeightUnit::of_largest(&whole),
+            unit: unit_of_largest(&whole),
             covered: Arc::clone(&whole),
             whole,
             size,

@@ -47,6 +47,8 @@ mod regions;
 #[cfg(test)]
 mod statistics;
 #[cfg(test)]
+mod stored_sums;
+#[cfg(test)]
 mod strangers;
 #[cfg(test)]
 mod takahashi;

@@ -1,12 +1,16 @@
 //! A cube as an earlier version of this program wrote it (`storage/tests/frozen`).
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
+use contract::grid::Grid;
+use contract::key::ObjectKey;
 use contract::manifest::{MANIFEST_SCHEMA, Manifest};
-use cube::{At, Repository, folder, follow};
+use contract::quantity::Quantity;
+use cube::{At, Edit, Repository, Values, compact, folder, follow};
 use storage::{Store, fields, manifests};
 
-use crate::product::bits;
+use crate::product::{bits, description, grid, month};
 
 fn frozen(version: u32) -> PathBuf {
     let frozen = Path::new(env!("CARGO_MANIFEST_DIR")).join("../storage/tests/frozen");
@@ -15,6 +19,10 @@ fn frozen(version: u32) -> PathBuf {
 
 /// A copy of a frozen store.
 fn copy(version: u32) -> (tempfile::TempDir, Store) {
+    copy_of(&frozen(version))
+}
+
+fn copy_of(frozen: &Path) -> (tempfile::TempDir, Store) {
     fn copy_all(from: &Path, to: &Path) {
         std::fs::create_dir_all(to).unwrap();
         for entry in std::fs::read_dir(from).unwrap() {
@@ -28,7 +36,7 @@ fn copy(version: u32) -> (tempfile::TempDir, Store) {
         }
     }
     let folder = tempfile::tempdir().unwrap();
-    copy_all(&frozen(version), folder.path());
+    copy_all(frozen, folder.path());
     let store = Store::open(folder.path().to_str().unwrap()).unwrap();
     (folder, store)
 }
@@ -90,4 +98,84 @@ async fn fields_under_names_of_before_are_put_once() {
         assert_eq!(followed.put_count, usize::from(is_back));
         holds(&store, &manifest, At::Newest).await;
     }
+}
+
+/// Two rows and two columns of blocks, all of them cut but one, and steps that are made time-major at once.
+const SUMMED: [u32; 2] = [9, 11];
+const SUMMED_STEPS: usize = 16;
+
+fn flux(step: usize, cell: usize) -> f32 {
+    match (cell * 5 + step) % 7 {
+        0 => f32::NAN,
+        at => (at as f32 - 3.0) * 2.5e-9,
+    }
+}
+
+/// The same steps as a version of a product.
+async fn summed_version(grid: Grid) -> Manifest {
+    let mut manifest = crate::follow::version(&Store::memory(), grid, 1, &[(1, 1)]).await;
+    let blank = manifest.steps.remove(0);
+    for step in 0..SUMMED_STEPS {
+        let mut own = blank.clone();
+        own.period = month(step as u32 + 1);
+        let values: Vec<f32> = (0..grid.cell_count()).map(|cell| flux(step, cell)).collect();
+        let digest = fields::digest_of(&grid, &values, own.period);
+        own.field = ObjectKey::field(&manifest.product, &digest);
+        manifest.steps.push(own);
+    }
+    manifest
+}
+
+#[tokio::test]
+async fn frozen_sums_are_those_of_their_values() {
+    let grid = grid(SUMMED[0], SUMMED[1]);
+    if let Some(to_freeze) = std::env::var_os("FLUXGLOBE_FREEZE").map(PathBuf::from) {
+        let store = Store::open(to_freeze.join("sums").to_str().unwrap()).unwrap();
+        let description = description(Quantity::CarbonFlux, grid);
+        let made = Repository::create(&store, "cubes/p", &description).await;
+        let repository = made.unwrap();
+        let mut edit = Edit::begin(&repository).await.unwrap();
+        for step in 0..SUMMED_STEPS {
+            let values: Arc<[f32]> = (0..grid.cell_count()).map(|cell| flux(step, cell)).collect();
+            edit.put(month(step as u32 + 1), values).await.unwrap();
+        }
+        edit.commit("to freeze").await.unwrap();
+        assert_eq!(compact(&store, "cubes/p").await.unwrap(), 1);
+    }
+    let sums = frozen(MANIFEST_SCHEMA).with_file_name("sums");
+    let (_folder, store) = copy_of(&sums);
+    let manifest = Arc::new(summed_version(grid).await);
+    let values = Values::of(&store, &manifest).await.unwrap();
+    let steps = 0..SUMMED_STEPS;
+    let basis = values.summed_as(&steps).unwrap();
+    assert_eq!(basis.row_weights.len(), SUMMED[0] as usize);
+    let blocks = [[0, 0], [0, 1], [1, 0], [1, 1]];
+    let found = values.sums(&blocks, steps.clone()).await.unwrap().unwrap();
+    let mut count = 0;
+    let sound = found.each(|number, record| {
+        let ([row, col], mut asked) = (blocks[number].map(|at| at * 8), 0);
+        for step in steps.clone() {
+            let (mut held, mut weight, mut sum, mut squares) = (0, 0, 0, 0);
+            for row in row..(row + 8).min(SUMMED[0]) {
+                for col in 0..(col + 8).min(SUMMED[1]) {
+                    let value = flux(step, (row * SUMMED[1] + col) as usize);
+                    if value.is_nan() {
+                        continue;
+                    }
+                    let own = basis.row_weights[row as usize];
+                    held += 1;
+                    weight += own;
+                    sum += i128::from(own) * i128::from(basis.scale.steps(value));
+                    squares += i128::from(own) * i128::from(basis.scale.square_steps(value));
+                }
+            }
+            assert_eq!((record.counts[step], record.weights[step]), (held, weight));
+            assert_eq!((record.sums[step], record.squares[step]), (sum, squares));
+            asked += 1;
+        }
+        count += 1;
+        asked == SUMMED_STEPS
+    });
+    assert!(sound.is_ok());
+    assert_eq!((count, found.pieces().len()), (4, 1));
 }

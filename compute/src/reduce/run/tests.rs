@@ -3,12 +3,12 @@
 use std::num::NonZeroUsize;
 
 use contract::digest::Digest;
+use cube::scale::Scale;
+use cube::weight_unit::WeightUnit;
 use datafusion::arrow::util::pretty::pretty_format_batches;
 use storage::Store;
 
 use super::*;
-use crate::reduce::cells::WeightUnit;
-use crate::reduce::scale::Scale;
 use crate::reduce::task::{Layout, Wanted};
 
 fn question() -> Question {
@@ -18,7 +18,10 @@ fn question() -> Question {
         covered: "computed:{}".to_owned(),
         unit: WeightUnit::default(),
         scale: Scale::of_all(),
-        wanted: Wanted::Sums { with_squares: true },
+        wanted: Wanted::Sums {
+            with_squares: true,
+            with_extremes: true,
+        },
     }
 }
 
@@ -32,6 +35,7 @@ fn pieces(count: u32) -> Vec<Piece> {
             first_step: at * 5,
             steps: 0..5,
             rows: vec![0, 1],
+            inside: vec![],
         }
     };
     (0..count).map(piece).collect()

@@ -1,4 +1,4 @@
-//! Fixed-point numbers that values are summed in, whatever the quantity.
+//! Fixed-point numbers that values are summed in, whatever the quantity: by questions, and in sums that are stored.
 
 use contract::quantity::Quantity;
 use serde::{Deserialize, Serialize};
@@ -18,10 +18,10 @@ const MAGIC: f64 = 6_755_399_441_055_744.0; // 1.5 * 2^52
 /// small difference of two large numbers. Steps are 2⁻⁴⁴ of the largest distance from it that can be true, next power of
 /// two: 2 pK of a temperature, 5e-20 kg m⁻² s⁻¹ of a flux, far below what 24 bits of a stored value tell.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub(super) struct Scale {
+pub struct Scale {
     /// Value that is summed as 0, stored unit.
     #[serde(with = "bits")]
-    pub(super) zero: f64,
+    pub(crate) zero: f64,
     /// The unit of the scale as a power of two, stored unit.
     exponent: i32,
 }
@@ -42,7 +42,7 @@ mod bits {
 
 impl Scale {
     /// That of a quantity; none of one whose values are not known to lie in any range.
-    pub(super) fn of(quantity: Quantity) -> Option<Self> {
+    pub fn of(quantity: Quantity) -> Option<Self> {
         match quantity {
             Quantity::Open(_) => None,
             other => Some(Self::over(other.plausible().into_inner())),
@@ -50,12 +50,12 @@ impl Scale {
     }
 
     /// One that tells nothing but which values there are.
-    pub(super) fn of_all() -> Self {
+    pub fn of_all() -> Self {
         Self::over((f32::MIN.into(), f32::MAX.into()))
     }
 
     /// That of values between two.
-    pub(super) fn over((low, high): (f64, f64)) -> Self {
+    pub fn over((low, high): (f64, f64)) -> Self {
         let is_far = low > 0.0 || high < 0.0;
         let zero = if is_far { 0.5 * (low + high) } else { 0.0 };
         let largest = (high - zero).max(zero - low);
@@ -75,23 +75,36 @@ impl Scale {
 
     /// What a value less the zero is multiplied with.
     #[inline]
-    pub(super) fn steps_per_value(self) -> f64 {
+    pub fn steps_per_value(self) -> f64 {
         f64::from(VALUE_BITS).exp2() / self.unit()
     }
 
     /// What the square of a number of steps is multiplied with to be one of squares.
     #[inline]
-    pub(super) fn squares_per_step() -> f64 {
+    pub fn squares_per_step() -> f64 {
         f64::from(SQUARE_BITS - 2 * VALUE_BITS).exp2()
     }
 
+    /// A value as the nearest number of steps. What cannot be summed gives some number: [`Scale::holds`] tells.
+    #[inline]
+    pub fn steps(self, value: f32) -> i64 {
+        nearest((f64::from(value) - self.zero) * self.steps_per_value())
+    }
+
+    /// Its square as the nearest number of steps of squares.
+    #[inline]
+    pub fn square_steps(self, value: f32) -> i64 {
+        let steps = (f64::from(value) - self.zero) * self.steps_per_value();
+        nearest(steps * steps * Self::squares_per_step())
+    }
+
     /// Can a value be summed? Infinite ones cannot.
-    pub(super) fn holds(self, value: f32) -> bool {
+    pub fn holds(self, value: f32) -> bool {
         (f64::from(value) - self.zero).abs() <= LIMIT * self.unit()
     }
 
     /// The mean of some values, stored unit: their weighted sum in steps over their weight.
-    pub(super) fn mean(self, sum: i128, weight: i128) -> f64 {
+    pub fn mean(self, sum: i128, weight: i128) -> f64 {
         self.zero + self.deviation(sum, weight)
     }
 
@@ -101,7 +114,7 @@ impl Scale {
     }
 
     /// Standard deviation of the population, stored unit.
-    pub(super) fn std(self, squares: i128, sum: i128, weight: i128) -> f64 {
+    pub fn std(self, squares: i128, sum: i128, weight: i128) -> f64 {
         let of_squares = squares as f64 / weight as f64 * self.unit() * self.unit()
             / f64::from(SQUARE_BITS).exp2();
         let mean = self.deviation(sum, weight);
@@ -112,7 +125,7 @@ impl Scale {
 
 /// The nearest integer, halves to even; the number must lie below 2⁵¹.
 #[inline]
-pub(super) fn nearest(number: f64) -> i64 {
+pub fn nearest(number: f64) -> i64 {
     let bits = (number + MAGIC).to_bits() as i64;
     bits.wrapping_sub(MAGIC.to_bits() as i64)
 }

@@ -1,0 +1,93 @@
+//! Stored sums of blocks of a version, where its cube has them: read as they are stored, decoded one after the other.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use bytes::Bytes;
+
+use crate::blocks::ChunkDecoder;
+use crate::record::{RECORD_BYTES, Record};
+use crate::sums::Basis;
+use crate::values::{Piece, Undecoded, Values};
+use crate::{Cube, CubeError};
+
+/// Records of sums of a run of steps, read and not decoded yet.
+pub struct EncodedSums {
+    cube: Cube,
+    run: usize,
+    at: Vec<[u32; 2]>,
+    content: Vec<Option<Bytes>>,
+    pieces: Vec<Piece>,
+}
+
+impl EncodedSums {
+    /// Where the steps that were asked for lie in the run.
+    pub fn pieces(&self) -> &[Piece] {
+        &self.pieces
+    }
+
+    /// Bytes of all of them as they are stored.
+    pub fn stored_bytes(&self) -> usize {
+        self.content.iter().flatten().map(Bytes::len).sum()
+    }
+
+    /// Decodes one record after the other and hands over its place among those asked for; those that hold nothing, neither of
+    /// their block nor of any west of it, are left out. `take` says whether to go on.
+    ///
+    /// # Errors
+    /// The first one that is damaged; [`EncodedSums::error`] makes an error of it.
+    pub fn each(&self, mut take: impl FnMut(usize, &Record) -> bool) -> Result<(), Undecoded> {
+        let decoder = ChunkDecoder::new(RECORD_BYTES);
+        let mut decoder = decoder.map_err(|reason| Undecoded(0, reason))?;
+        let mut record = Record::default();
+        for (number, content) in self.content.iter().enumerate() {
+            let Some(content) = content else { continue };
+            let read = decoder.decode(content).and_then(|own| record.read(own));
+            read.map_err(|reason| Undecoded(number, reason))?;
+            if !take(number, &record) {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// The error of a record that cannot be decoded, which names its object.
+    pub async fn error(&self, undecoded: Undecoded) -> CubeError {
+        let Undecoded(number, reason) = undecoded;
+        let at = self.at[number];
+        self.cube.undecoded_record(self.run, at, &reason).await
+    }
+}
+
+impl Values {
+    /// How values and cells count in stored sums of the run that holds these steps; none where there are none.
+    pub fn summed_as(&self, steps: &Range<usize>) -> Option<Arc<Basis>> {
+        let (cube, run, _pieces) = self.run_of(steps)?;
+        let basis = cube.sums().basis.clone();
+        basis.filter(|_| cube.is_summed(run))
+    }
+
+    /// Stored sums of a run of steps up to each of these blocks; none where [`Values::summed_as`] says that there are none.
+    ///
+    /// # Errors
+    /// A store that does not answer; a chunk that is damaged or gone, by its name.
+    pub async fn sums(
+        &self,
+        blocks: &[[u32; 2]],
+        steps: Range<usize>,
+    ) -> Result<Option<EncodedSums>, CubeError> {
+        let Some((cube, run, pieces)) = self.run_of(&steps) else {
+            return Ok(None);
+        };
+        if !cube.is_summed(run) {
+            return Ok(None);
+        }
+        Ok(Some(EncodedSums {
+            content: cube.records(run, blocks).await?,
+            cube,
+            run,
+            at: blocks.to_vec(),
+            pieces,
+        }))
+    }
+}

@@ -1,0 +1,134 @@
+//! What is stored of a block of cells and a run of steps: sums of it and of all blocks west of it in its shard, and which of
+//! its own cells hold data. Numbers in, bytes out, and back.
+//!
+//! Sums along a row of blocks lead to those of any blocks side by side by one difference, however many they are.
+
+use crate::layout::RUN_STEPS;
+
+/// Bytes before the numbers.
+const HEADER_BYTES: usize = 8;
+/// Bytes of all numbers of a step: cells with data, their count, their weight, sum and squares.
+const STEP_BYTES: usize = 8 + 4 + 8 + 16 + 16;
+/// Bytes of a record.
+pub(crate) const RECORD_BYTES: usize = HEADER_BYTES + RUN_STEPS * STEP_BYTES;
+/// First byte of a record that holds no sums.
+const UNSUMMED: u8 = 1;
+
+/// Numbers of a block at every step of a run; all zero where it and those west of it have no data.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Record {
+    /// Could all values be summed? Else only `valid` says anything.
+    pub is_summed: bool,
+    /// Cells of this block that hold data, a bit each: the first of its first row is the lowest.
+    pub valid: Vec<u64>,
+    /// Values that are there, of this block and those west of it in its shard.
+    pub counts: Vec<u32>,
+    /// Their weight.
+    pub weights: Vec<i64>,
+    /// Weight x value, in steps of the scale.
+    pub sums: Vec<i128>,
+    /// Weight x its square, in steps of squares.
+    pub squares: Vec<i128>,
+}
+
+impl Default for Record {
+    fn default() -> Self {
+        Self {
+            is_summed: true,
+            valid: vec![0; RUN_STEPS],
+            counts: vec![0; RUN_STEPS],
+            weights: vec![0; RUN_STEPS],
+            sums: vec![0; RUN_STEPS],
+            squares: vec![0; RUN_STEPS],
+        }
+    }
+}
+
+impl Record {
+    /// Writes it: the same byte of all steps side by side, so that what does not change is compressed away.
+    pub(crate) fn write(&self, out: &mut [u8]) {
+        let (header, out) = out.split_at_mut(HEADER_BYTES);
+        header.fill(0);
+        header[0] = if self.is_summed { 0 } else { UNSUMMED };
+        let mut planes = out.chunks_exact_mut(RUN_STEPS);
+        let mut put = |count: usize, byte: &dyn Fn(usize, usize) -> u8| {
+            for place in 0..count {
+                let Some(plane) = planes.next() else { return };
+                for (step, own) in plane.iter_mut().enumerate() {
+                    *own = byte(step, place);
+                }
+            }
+        };
+        put(8, &|step, place| self.valid[step].to_le_bytes()[place]);
+        put(4, &|step, place| self.counts[step].to_le_bytes()[place]);
+        put(8, &|step, place| self.weights[step].to_le_bytes()[place]);
+        put(16, &|step, place| self.sums[step].to_le_bytes()[place]);
+        put(16, &|step, place| self.squares[step].to_le_bytes()[place]);
+    }
+
+    /// Reads one of [`RECORD_BYTES`] bytes.
+    ///
+    /// # Errors
+    /// It begins as no record does.
+    pub(crate) fn read(&mut self, bytes: &[u8]) -> Result<(), String> {
+        self.is_summed = match bytes.first() {
+            Some(0) => true,
+            Some(&UNSUMMED) => false,
+            other => return Err(format!("it begins with {other:?}, as no record of sums does")),
+        };
+        let mut planes = bytes[HEADER_BYTES..].chunks_exact(RUN_STEPS);
+        let mut word = |count: usize| {
+            let mut words = [0u64; RUN_STEPS];
+            for (place, plane) in planes.by_ref().take(count).enumerate() {
+                for (word, byte) in words.iter_mut().zip(plane) {
+                    *word |= u64::from(*byte) << (8 * place);
+                }
+            }
+            words
+        };
+        self.valid.copy_from_slice(&word(8));
+        for (own, count) in self.counts.iter_mut().zip(word(4)) {
+            *own = count as u32;
+        }
+        for (own, weight) in self.weights.iter_mut().zip(word(8)) {
+            *own = weight.cast_signed();
+        }
+        for sums in [&mut self.sums, &mut self.squares] {
+            let (low, high) = (word(8), word(8));
+            for (own, (low, high)) in sums.iter_mut().zip(low.into_iter().zip(high)) {
+                *own = i128::from(high.cast_signed()) << 64 | i128::from(low);
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bytes_lead_back_and_nothing_is_all_zeros() {
+        let mut bytes = vec![7; RECORD_BYTES];
+        Record::default().write(&mut bytes);
+        assert!(bytes.iter().all(|byte| *byte == 0));
+        let mut own = Record::default();
+        for step in 0..RUN_STEPS {
+            let number = step as i128 + 3;
+            own.valid[step] = u64::MAX / (step as u64 + 1);
+            own.counts[step] = u32::MAX - step as u32;
+            own.weights[step] = i64::MAX - step as i64;
+            own.sums[step] = -(number << 90) + 5;
+            own.squares[step] = i128::MAX / number;
+        }
+        for is_summed in [true, false] {
+            own.is_summed = is_summed;
+            own.write(&mut bytes);
+            let mut back = Record::default();
+            back.read(&bytes).unwrap();
+            assert_eq!(back, own);
+        }
+        bytes[0] = 2;
+        assert!(Record::default().read(&bytes).is_err());
+    }
+}
