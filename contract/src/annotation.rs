@@ -21,7 +21,7 @@ pub use wishes::{Annotation, AnnotationWishes, Wanted};
 
 /// Raised whenever the same annotations are drawn differently, so that old pictures are not taken for new ones; pictures
 /// without annotations keep their names. `BLESS=1` of the golden annotated pictures asks for it.
-pub const ANNOTATION_VERSION: u32 = 3;
+pub const ANNOTATION_VERSION: u32 = 4;
 
 /// What is drawn over a picture of the globe. Nothing of it is in the name of a picture without.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -40,6 +40,7 @@ pub mod product;
 pub mod quantity;
 pub mod region;
 pub mod series;
+mod sky;
 pub mod statistics;
 pub mod sun;
 pub mod tile;

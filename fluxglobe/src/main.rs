@@ -16,6 +16,7 @@ mod progress;
 mod protocol;
 mod services;
 mod sink;
+mod sky;
 mod viewer;
 
 use std::process::ExitCode;

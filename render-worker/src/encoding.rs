@@ -11,7 +11,7 @@ use contract::job::RenderJob;
 use render::Image;
 use tokio::sync::Semaphore;
 
-use crate::annotation;
+use crate::annotation::{self, Lifted};
 use crate::error::DrawError;
 
 /// The cores that encode pictures. Cheap to clone.
@@ -40,18 +40,19 @@ impl Encoders {
         self.count - self.cores.available_permits()
     }
 
-    /// The bytes of a picture, with the annotations of a job over it if one is given. `turn` is let go as soon as a core is free for it, before encoding
-    /// begins: whoever holds it back until then draws no more pictures than the cores can take.
+    /// The bytes of a picture, with the annotations of a job over it if one is given, whose columns go so far. `turn` is let go as
+    /// soon as a core is free for it, before encoding begins: whoever holds it back until then draws no more pictures than
+    /// the cores can take.
     pub(crate) async fn encode(
         &self,
-        annotated: Option<RenderJob>,
+        annotated: Option<(RenderJob, Lifted)>,
         image: Image,
         encoding: Encoding,
         turn: impl Send + 'static,
     ) -> Result<Bytes, DrawError> {
         let finished = move || -> Result<Bytes, DrawError> {
             let image = match annotated {
-                Some(job) => annotation::annotated(&job, image)?,
+                Some((job, lifted)) => annotation::annotated(&job, &lifted, image)?,
                 None => image,
             };
             Ok(match encoding {

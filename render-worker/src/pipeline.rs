@@ -14,6 +14,7 @@ use render::scene::Scene;
 use render::{Backend, Image, Renderer, timings};
 use storage::Store;
 
+use crate::annotation::Lifted;
 use crate::encoding::Encoders;
 use crate::error::DrawError;
 use crate::prefetch::Prefetch;
@@ -57,6 +58,17 @@ pub struct Pipeline {
     source: Arc<Source>,
     prefetch: Arc<Prefetch>,
     encoders: Encoders,
+}
+
+/// A picture as it is drawn.
+#[derive(Debug)]
+pub struct Picture {
+    /// Its pixels.
+    pub image: Image,
+    /// How far its columns go, where it has a height bar.
+    pub lifted: Lifted,
+    /// How long the steps took.
+    pub timings: Timings,
 }
 
 /// Steps of drawing by name, and how long each took.
@@ -110,8 +122,8 @@ impl Pipeline {
         self.source.scene(job).await
     }
 
-    /// Draws a loaded scene, or a part of its picture, and tells how long the steps took; `held` is let go when the drawing
-    /// thread has ended, also if nobody waits for it.
+    /// Draws a loaded scene, or a part of its picture; `held` is let go when the drawing thread has ended, also if nobody
+    /// waits for it.
     pub async fn picture(
         &self,
         job: &RenderJob,
@@ -119,14 +131,19 @@ impl Pipeline {
         scene: Scene,
         is_wanted: IsWanted,
         held: impl Send + 'static,
-    ) -> Result<(Image, Timings), DrawError> {
+    ) -> Result<Picture, DrawError> {
         let (renderer, own) = (Arc::clone(&self.renderer), job.clone());
         let drawing = tokio::task::spawn_blocking(move || {
             let image = renderer.render_part(&own, &scene, part, &*is_wanted);
+            let lifted = Lifted::of(&own, &scene);
             drop(held);
             // Also what a picture took that was not wanted any more: it is not the next one's.
             let timings = timings::taken();
-            image.map(|image| (image, timings))
+            image.map(|image| Picture {
+                image,
+                lifted,
+                timings,
+            })
         });
         let drawn = drawing.await.map_err(DrawError::Thread)??;
         // Not before: what is wanted now goes first.
@@ -134,11 +151,11 @@ impl Pipeline {
         Ok(drawn)
     }
 
-    /// Encodes a picture, with the annotations of a job over it if one is given; `turn` is let go when that begins, which
+    /// Encodes a picture, with the annotations of a job over it if one is given, whose columns go so far; `turn` is let go when that begins, which
     /// may have to wait for a core.
     pub async fn encode(
         &self,
-        annotated: Option<RenderJob>,
+        annotated: Option<(RenderJob, Lifted)>,
         image: Image,
         encoding: Encoding,
         turn: impl Send + 'static,

@@ -13,7 +13,8 @@
 //! names what shapes a picture besides (`edition.rs`): an address with `time`, `manifest` and the edition of now is
 //! answered as one that never changes. An instant outside what a product covers shows the nearest one inside; pictures
 //! say so in `fluxglobe-time` and `fluxglobe-time-covered`. Where particles are lifted, pictures say where heights end in
-//! `fluxglobe-heights-end`, and deep tiles in `fluxglobe-heights-within`. Every refusal is one JSON body, `error::Refusal`.
+//! `fluxglobe-heights-end`, and deep tiles in `fluxglobe-heights-within`; a view with nothing of the earth's surface in it
+//! says so in `fluxglobe-tilt-with-ground`. Every refusal is one JSON body, `error::Refusal`.
 //!
 //! Tiles, views, TileJSON and legends take how a picture is to look, in the unit people read (`look.rs`).
 //!

@@ -16,7 +16,7 @@ use tower_http::cors::{Any, CorsLayer};
 
 use crate::error::ServerError;
 use crate::middleware::{body, panics::CountPanics, security, track};
-use crate::routes::picture::{COVERED, HEIGHTS_END, HEIGHTS_WITHIN, SHOWN_TIME};
+use crate::routes::picture::{COVERED, HEIGHTS_END, HEIGHTS_WITHIN, SHOWN_TIME, TILT_WITH_GROUND};
 use crate::routes::{
     analysis, area, budget, check, correlation, difference, events, globe, health, hovmoller,
     legend, line, metrics, observations, openapi, palettes, platforms, point, products, regions,
@@ -43,6 +43,7 @@ pub fn router(state: AppState) -> Router {
             COVERED,
             HEIGHTS_END,
             HEIGHTS_WITHIN,
+            TILT_WITH_GROUND,
             header::CONTENT_LOCATION,
         ]);
     // What a request waited for goes on after its time only if somebody else waits for it too, or comes again (`pictures.rs`).

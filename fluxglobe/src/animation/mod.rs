@@ -14,6 +14,7 @@ use std::sync::Arc;
 use anyhow::{Context as _, Result, bail};
 use bytes::Bytes;
 use contract::encoding::Encoding;
+use contract::job::View;
 use contract::manifest::Manifest;
 use contract::sun::SunChoice;
 use contract::time::TimeMs;
@@ -27,7 +28,7 @@ use tile_server::backend::{Draw, Keep, Turn};
 use crate::cli::{RenderAnimation, Settings};
 use crate::picture::Extras;
 use crate::ports::{Drawer, FleetDrawer};
-use crate::{deployment, heights, picture, progress};
+use crate::{deployment, heights, picture, progress, sky};
 use film::Film;
 use path::CameraPath;
 use shots::Shots;
@@ -46,7 +47,13 @@ pub(crate) async fn run(settings: &Settings, store: Store, options: RenderAnimat
     film::check(&options)?;
     let shots = Arc::new(shots(settings, &store, &options).await?);
     let jobs = (0..shots.count()).map(|number| shots.job(number));
-    if let Some(note) = heights::note_of_film(&store, &jobs.collect::<Result<Vec<_>>>()?).await? {
+    let jobs = jobs.collect::<Result<Vec<_>>>()?;
+    let views: Vec<View> = jobs.iter().map(|job| job.view).collect();
+    let notes = [
+        sky::note_of_film(&views),
+        heights::note_of_film(&store, &jobs).await?,
+    ];
+    for note in notes.into_iter().flatten() {
         progress::say(&note);
     }
     let drawer = drawer(settings, store, &options).await?;

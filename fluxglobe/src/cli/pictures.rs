@@ -131,6 +131,12 @@ pub(crate) struct BenchQuality {
     /// Only scenes that have this in their name.
     #[arg(long, value_name = "TEXT")]
     pub(crate) only: Option<String>,
+    /// Fail, naming them, if scenes have less PSNR than this over what is drawn, with any of the numbers of slices.
+    #[arg(long, value_name = "DB")]
+    pub(crate) least_psnr: Option<f64>,
+    /// Fail, naming them, if scenes have a larger mean FLIP than this over what is drawn.
+    #[arg(long, value_name = "FLIP")]
+    pub(crate) most_flip: Option<f64>,
     /// Plot to write: both measures over what is drawn.
     #[arg(long, value_name = "FILE.svg")]
     pub(crate) plot: Option<PathBuf>,

@@ -8,7 +8,7 @@ use render_worker::desk::{Order, Storing};
 use crate::cli::{Render, Settings};
 use crate::command::legend;
 use crate::picture::Extras;
-use crate::{animation, deployment, heights, picture, progress};
+use crate::{animation, deployment, heights, picture, progress, sky};
 
 pub(crate) async fn run(settings: &Settings, options: Render) -> Result<()> {
     let store = deployment::store(settings)?;
@@ -33,7 +33,8 @@ pub(crate) async fn run(settings: &Settings, options: Render) -> Result<()> {
         Render::Legend(options) => return legend::run(settings, &store, &options).await,
     };
     let job = picture::job(&store, settings, &asked, view, extras).await?;
-    if let Some(note) = heights::note(&store, &job).await? {
+    let notes = [sky::note(&job.view), heights::note(&store, &job).await?];
+    for note in notes.into_iter().flatten() {
         progress::say(&note);
     }
     let bar = progress::bar("draw", 1);

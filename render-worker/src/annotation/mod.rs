@@ -1,6 +1,6 @@
 //! A job and its finished picture in, the same picture with what explains it drawn over out.
 //!
-//! The drawing is one SVG, a pure function of the job: panels in the corners, lines and names where the camera of the
+//! The drawing is one SVG, a pure function of the job and of how far its columns go: panels in the corners, lines and names where the camera of the
 //! picture sees them (`render::plan::Projection`). What does not fit is left out, never squeezed over something else.
 
 mod bars;
@@ -8,6 +8,7 @@ mod blend;
 mod caption;
 mod graticule;
 mod key;
+mod lifted;
 mod names;
 mod page;
 mod panel;
@@ -20,17 +21,18 @@ use legend::raster;
 use render::Image;
 use render::plan::Projection;
 
+pub use lifted::Lifted;
 use page::Page;
 
 /// Pictures with a shorter side than this have no room for anything, pixels.
 const LEAST_SIDE_PX: u32 = 96;
 
-/// The picture of a job with its annotations; the same picture if it has none, or no room for any.
+/// The picture of a job, whose columns go so far, with its annotations; the same picture if it has none, or no room for any.
 ///
 /// # Errors
 /// None that a valid job has; defects of the drawing.
-pub fn annotated(job: &RenderJob, image: Image) -> Result<Image, LegendError> {
-    let Some(svg) = drawing(job)? else {
+pub fn annotated(job: &RenderJob, lifted: &Lifted, image: Image) -> Result<Image, LegendError> {
+    let Some(svg) = drawing(job, lifted)? else {
         return Ok(image);
     };
     Ok(blend::over(image, &raster::pixels(&svg)?))
@@ -40,7 +42,7 @@ pub fn annotated(job: &RenderJob, image: Image) -> Result<Image, LegendError> {
 ///
 /// # Errors
 /// As [`annotated`].
-pub fn drawing(job: &RenderJob) -> Result<Option<String>, LegendError> {
+pub fn drawing(job: &RenderJob, lifted: &Lifted) -> Result<Option<String>, LegendError> {
     let size_px = job.view.size_px();
     let (Some(annotations), Some(projection)) = (&job.annotations, Projection::of(&job.view))
     else {
@@ -61,7 +63,7 @@ pub fn drawing(job: &RenderJob) -> Result<Option<String>, LegendError> {
     if let Some(date) = &annotations.date {
         key::draw_date(&mut page, date)?;
     }
-    bars::draw(&mut page, job, annotations, &projection)?;
+    bars::draw(&mut page, job, lifted, annotations, &projection)?;
     let grid = annotations
         .graticule
         .map(|graticule| graticule::Lines::of(graticule, &projection, page.size()));

@@ -7,6 +7,12 @@ use contract::job::{Mode, View};
 use contract::quantity::Quantity;
 use render_proof::ocean;
 
+/// Columns of 45 g C m⁻² upwards and of 62 downwards.
+const LIFTED: Lifted = Lifted {
+    up_kg_m2: 0.045,
+    down_kg_m2: 0.062,
+};
+
 /// Takes one annotation away.
 type Without = fn(&mut Annotations);
 
@@ -55,7 +61,7 @@ fn drawn(view: View, change: impl Fn(&mut Annotations)) -> String {
     change(&mut annotations);
     let job = job(view, annotations);
     job.validate().unwrap();
-    drawing(&job).unwrap().unwrap()
+    drawing(&job, &LIFTED).unwrap().unwrap()
 }
 
 /// Sizes and views of all sorts.
@@ -177,16 +183,22 @@ fn a_picture_without_annotations_or_room_keeps_its_bytes() {
         annotations: None,
         ..job(view(300, 200, 1e7, 0.0), all())
     };
-    assert_eq!(annotated(&plain, image(300, 200)).unwrap(), image(300, 200));
+    assert_eq!(
+        annotated(&plain, &LIFTED, image(300, 200)).unwrap(),
+        image(300, 200)
+    );
     for (width, height) in [(1, 1), (16, 16), (4096, 16), (95, 95)] {
         let job = job(view(width, height, 1e7, 0.0), all());
         assert_eq!(
-            annotated(&job, image(width, height)).unwrap(),
+            annotated(&job, &LIFTED, image(width, height)).unwrap(),
             image(width, height)
         );
     }
     let small = job(view(300, 200, 1e7, 0.0), all());
-    assert_ne!(annotated(&small, image(300, 200)).unwrap(), image(300, 200));
+    assert_ne!(
+        annotated(&small, &LIFTED, image(300, 200)).unwrap(),
+        image(300, 200)
+    );
 }
 
 #[test]
@@ -217,49 +229,178 @@ fn hostile_words_are_words() {
     raster::pixels(&svg).unwrap();
 }
 
-#[test]
-fn the_height_bar_is_as_high_as_the_plumes_in_the_middle() {
-    let view = view(1600, 900, 3e6, 35.0);
-    let svg = drawn(view, |a| {
-        *a = Annotations {
-            height: a.height,
-            ..Annotations::none()
-        };
-    });
-    let projection = Projection::of(&view).unwrap();
-    let middle = projection.ground_at([800.0, 450.0]).unwrap();
-    // 20 g C m-2 are 160 km at 8000 km for a kilogram.
-    let [foot, top] = [0.0, 160e3].map(|height| projection.seen(middle, height).unwrap());
-    let expected = (top.x_px - foot.x_px).hypot(top.y_px - foot.y_px);
-    let base = |text: &str| -> f64 {
-        let (before, _) = svg.split_once(&format!(">{text}")).unwrap();
-        let (_, tag) = before.rsplit_once(" y=\"").unwrap();
-        tag.split('"').next().unwrap().parse().unwrap()
+/// The height bar alone.
+fn bar_of(view: View, height_m_per_kg_m2: f64, up_kg_m2: f64, down_kg_m2: f64) -> String {
+    let height = all().height;
+    let only = Annotations {
+        height,
+        ..Annotations::none()
     };
-    let drawn = base("0 sea surface") - base("20</text>");
+    let mut job = job(view, only);
+    job.style.height_m_per_kg_m2 = height_m_per_kg_m2;
+    let lifted = Lifted {
+        up_kg_m2,
+        down_kg_m2,
+    };
+    drawing(&job, &lifted).unwrap().unwrap()
+}
+
+/// How far down a drawing a text stands that begins so.
+fn base_of(svg: &str, text: &str) -> f64 {
+    let (before, _) = svg
+        .split_once(&format!(">{text}"))
+        .unwrap_or_else(|| panic!("{text}: {svg}"));
+    let (_, tag) = before.rsplit_once(" y=\"").unwrap();
+    tag.split('"').next().unwrap().parse().unwrap()
+}
+
+/// Pixels from the sea surface to a height in the middle of a picture.
+fn expected_px(view: &View, height_m: f64) -> f64 {
+    let projection = Projection::of(view).unwrap();
+    let [width, height] = view.size_px().map(f64::from);
+    let middle = projection.ground_at([width / 2.0, height / 2.0]).unwrap();
+    let [foot, end] = [0.0, height_m].map(|height| projection.seen(middle, height).unwrap());
+    (end.x_px - foot.x_px).hypot(end.y_px - foot.y_px)
+}
+
+#[test]
+fn each_side_of_the_height_bar_is_as_long_as_its_columns_in_the_middle() {
+    let view = view(1600, 900, 6e6, 25.0);
+    let svg = bar_of(view, 8e6, 0.045, 0.062);
+    let surface = base_of(&svg, "0 sea surface");
+    // 45 g C m-2 are 360 km at 8000 km for a kilogram, 62 are 496.
+    for (text, height_m) in [("45 given off", 360e3_f64), ("62 taken up", -496e3)] {
+        let drawn = (surface - base_of(&svg, text)) * height_m.signum();
+        let expected = expected_px(&view, height_m);
+        assert!(
+            (drawn - expected).abs() < 0.02,
+            "{text}: {drawn} for {expected}: {svg}"
+        );
+    }
+    // A round number between, on either side, without a sign.
+    for (text, height_m) in [("25</text>", 200e3_f64), ("25</text>", -200e3)] {
+        let written = format!(">{text}");
+        let found = svg.match_indices(&written).map(|(at, _)| {
+            let (_, tag) = svg[..at].rsplit_once(" y=\"").unwrap();
+            tag.split('"').next().unwrap().parse::<f64>().unwrap()
+        });
+        let expected = surface - expected_px(&view, height_m) * height_m.signum();
+        let nearest = found
+            .map(|base| (base - expected).abs())
+            .fold(f64::INFINITY, f64::min);
+        assert!(nearest < 0.02, "{text}: {nearest}: {svg}");
+    }
     assert!(
-        (drawn - expected).abs() < 0.02,
-        "{drawn} for {expected}: {svg}"
+        svg.contains("Height: carbon given off, 45 at most"),
+        "{svg}"
     );
-    // Seen from above it has no length, and nothing of that height is drawn where nothing lifts.
-    let above = self::view(1600, 900, 6e6, 0.0);
-    assert!(!drawn_of(above, 8e6).contains("sea surface"));
-    assert!(drawn_of(above, 8e6).contains("more than 150 is cut off"));
-    assert!(!drawn_of(above, 0.0).contains("Height"));
-    // Where it fits as a whole, its end is marked.
-    assert!(!drawn_of(view, 8e6).contains("150 and more"));
-    let far = self::view(1600, 900, 1.2e7, 15.0);
+    assert!(svg.contains("Depth: carbon taken up, 62 at most"), "{svg}");
+}
+
+#[test]
+fn the_height_bar_has_the_sides_that_the_picture_has() {
+    let view = view(1600, 900, 6e6, 25.0);
+    let sinks = bar_of(view, 8e6, 0.0, 0.062);
+    assert!(base_of(&sinks, "62 taken up") > base_of(&sinks, "0 sea surface"));
     assert!(
-        drawn_of(far, 8e6).contains("150 and more"),
-        "{}",
-        drawn_of(far, 8e6)
+        !sinks.contains("Height: ") && !sinks.contains("given off"),
+        "{sinks}"
+    );
+    let sources = bar_of(view, 8e6, 0.045, 0.0);
+    assert!(base_of(&sources, "45 given off") < base_of(&sources, "0 sea surface"));
+    assert!(
+        !sources.contains("Depth: ") && !sources.contains("taken up"),
+        "{sources}"
+    );
+    // A side too short for its number is told in words alone.
+    let little = bar_of(view, 8e6, 0.002, 0.062);
+    assert!(
+        little.contains("Height: carbon given off, 2 at most"),
+        "{little}"
+    );
+    assert!(!little.contains(">2 given off"), "{little}");
+    let none = bar_of(view, 8e6, 0.0, 0.0);
+    assert!(
+        none.contains("No carbon given off or taken up here"),
+        "{none}"
+    );
+    assert!(!none.contains("sea surface"), "{none}");
+    // From below the sea nothing rises.
+    let mut below = self::view(1600, 900, -4.5e5, 84.0);
+    let View::Globe { angles, .. } = &mut below else {
+        panic!("a globe")
+    };
+    angles.field_of_view_deg = 55.0;
+    let hanging = bar_of(below, 8e6, 0.045, 0.062);
+    assert!(!hanging.contains("given off"), "{hanging}");
+    assert!(
+        base_of(&hanging, "0 sea surface") < 900.0 && hanging.contains("62 at most"),
+        "{hanging}"
     );
 }
 
-fn drawn_of(view: View, height_m_per_kg_m2: f64) -> String {
-    let mut job = job(view, all());
-    job.style.height_m_per_kg_m2 = height_m_per_kg_m2;
-    drawing(&job).unwrap().unwrap()
+#[test]
+fn both_sides_of_a_height_bar_are_to_one_scale_where_they_are_cut_short() {
+    let near = view(1600, 900, 2.5e6, 45.0);
+    let svg = bar_of(near, 2e7, 0.045, 0.030);
+    // Neither end fits: the numbers are round, and those at most are told in words.
+    assert!(
+        !svg.contains(">45 given off") && !svg.contains(">30 taken up"),
+        "{svg}"
+    );
+    assert!(
+        svg.contains("given off, 45 at most") && svg.contains("taken up, 30 at most"),
+        "{svg}"
+    );
+    let ends: Vec<(f64, f64)> = ["given off</text>", "taken up</text>"]
+        .into_iter()
+        .map(|what| {
+            let (before, _) = svg.split_once(&format!(" {what}")).unwrap();
+            let (before, number) = before.rsplit_once('>').unwrap();
+            let (_, tag) = before.rsplit_once(" y=\"").unwrap();
+            let base: f64 = tag.split('"').next().unwrap().parse().unwrap();
+            (number.parse().unwrap(), base)
+        })
+        .collect();
+    let surface = base_of(&svg, "0 sea surface");
+    for ((number, base), sign) in ends.into_iter().zip([1.0, -1.0]) {
+        let expected = expected_px(&near, sign * number * 2e4);
+        assert!(
+            (((surface - base) * sign) - expected).abs() < 0.02,
+            "{number}: {svg}"
+        );
+    }
+}
+
+#[test]
+fn where_heights_end_is_told_on_the_bar_or_in_words() {
+    // Seen from above it has no length, and nothing of that height is drawn where nothing lifts.
+    let above = view(1600, 900, 6e6, 0.0);
+    let svg = bar_of(above, 8e6, 0.2, 0.062);
+    assert!(!svg.contains("sea surface"), "{svg}");
+    assert!(svg.contains("more than 150 is cut off"), "{svg}");
+    assert!(!bar_of(above, 8e6, 0.1, 0.062).contains("cut off"));
+    let flat = {
+        let mut job = job(above, all());
+        job.style.height_m_per_kg_m2 = 0.0;
+        drawing(&job, &LIFTED).unwrap().unwrap()
+    };
+    assert!(!flat.contains("Height"), "{flat}");
+    // Where it fits as a whole, its end is marked, on the side that has it.
+    let far = view(1600, 900, 1.2e7, 15.0);
+    let svg = bar_of(far, 8e6, 0.2, 0.062);
+    assert!(
+        svg.contains("150 and more, cut off") && svg.contains("200 at most"),
+        "{svg}"
+    );
+    assert!(!svg.contains("more than 150"), "{svg}");
+    // Where it does not, it is told in words.
+    let near = view(1600, 900, 3e6, 35.0);
+    let svg = bar_of(near, 8e6, 0.2, 0.062);
+    assert!(
+        !svg.contains("150 and more") && svg.contains("more than 150 is cut off"),
+        "{svg}"
+    );
 }
 
 #[test]
@@ -268,6 +409,6 @@ fn a_flow_is_told_by_its_speed() {
     job.mode = Mode::Flow;
     let annotations = job.annotations.as_mut().unwrap();
     annotations.legend = Some(Quantity::Current);
-    let svg = drawing(&job).unwrap().unwrap();
+    let svg = drawing(&job, &LIFTED).unwrap().unwrap();
     assert!(svg.contains("Speed of the current") && !svg.contains("sea gives off"));
 }

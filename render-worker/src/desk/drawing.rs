@@ -8,15 +8,17 @@ use ::service::Outcome as Ended;
 use bytes::Bytes;
 use contract::job::RenderJob;
 use contract::key::ObjectKey;
+use render::RenderError;
 use render::plan::Part;
-use render::{Image, RenderError};
 use storage::{StorageError, Store};
 use tracing::Instrument as _;
 
 use super::queue::{Full, Permit};
 use super::single_flight::{Flight, Outcome};
 use super::{Class, DeskError, Drawn, Inner, Order, Origin, Storing, Turn};
+use crate::annotation::Lifted;
 use crate::error::DrawError;
+use crate::pipeline::Picture;
 
 /// Shortest and longest hint when to ask a full worker again.
 const RETRY_HINT: [Duration; 2] = [Duration::from_millis(100), Duration::from_secs(30)];
@@ -41,27 +43,28 @@ impl Inner {
         let begun = Instant::now();
         let drawn = self.drawn(job, order.part, flight, &permit).await;
         self.note(&drawn);
-        let image = drawn?;
+        let Picture { image, lifted, .. } = drawn?;
         self.learn(begun.elapsed());
         // Another draws while this one is encoded and stored.
         // Annotations go over the whole picture, by whoever puts parts together.
         let annotated = job.annotations.as_ref().filter(|_| order.part.is_none());
-        let annotated = annotated.map(|_some| job.clone());
+        let annotated = annotated.map(|_some| (job.clone(), lifted));
         let encoding = self
             .pipeline
             .encode(annotated, image, order.encoding, permit);
         let encoding = flight.while_wanted(Box::pin(encoding));
         let bytes = self.measured("encode", encoding).await?;
-        Ok(self.kept(job, bytes, order).await)
-    }
-
-    /// A picture after what the store has to do with it.
-    async fn kept(self: &Arc<Self>, job: &RenderJob, bytes: Bytes, order: Order) -> Drawn {
         let drawn = Drawn {
             bytes,
             origin: Origin::Drawn,
             kept: false,
+            lifted,
         };
+        Ok(self.kept(job, drawn, order).await)
+    }
+
+    /// A picture after what the store has to do with it.
+    async fn kept(self: &Arc<Self>, job: &RenderJob, drawn: Drawn, order: Order) -> Drawn {
         if order.storing == Storing::Nothing {
             self.pictures.with_label_values(&["drawn"]).inc();
             return drawn;
@@ -131,6 +134,7 @@ impl Inner {
                 bytes,
                 origin,
                 kept,
+                lifted: Lifted::default(),
             },
         )
     }
@@ -145,6 +149,7 @@ impl Inner {
                     bytes,
                     origin,
                     kept: true,
+                    lifted: Lifted::default(),
                 }))
             }
             Err(error) if error.is_not_found() => Ok(None),
@@ -182,19 +187,19 @@ impl Inner {
         part: Option<Part>,
         flight: &Arc<Flight>,
         permit: &Arc<(Permit, Turn)>,
-    ) -> Result<Image, DrawError> {
+    ) -> Result<Picture, DrawError> {
         let attempt = || async {
             let loading = flight.while_wanted(self.pipeline.scene(job));
             let scene = self.measured("load", loading).await?;
             let held = Arc::clone(permit);
             let wanted = flight.is_wanted();
             let drawing = self.pipeline.picture(job, part, scene, wanted, held);
-            let (image, timings) = self.measured("draw", drawing).await?;
-            for (step, took) in timings {
+            let picture = self.measured("draw", drawing).await?;
+            for (step, took) in picture.timings {
                 let histogram = self.step_s.with_label_values(&[step]);
                 histogram.observe(took.as_secs_f64());
             }
-            Ok(image)
+            Ok(picture)
         };
         self.pipeline.on_a_sound_device(attempt).await
     }
@@ -219,10 +224,10 @@ impl Inner {
         keep(&self.store, job, png, self.pipeline.name()).await
     }
 
-    fn note(&self, drawn: &Result<Image, DrawError>) {
+    fn note(&self, drawn: &Result<Picture, DrawError>) {
         let away = &self.is_without_device;
         match drawn {
-            Ok(_image) => away.store(false, Ordering::Release),
+            Ok(_picture) => away.store(false, Ordering::Release),
             Err(DrawError::Render(
                 RenderError::NoAdapter
                 | RenderError::UnknownAdapter { .. }

@@ -23,6 +23,7 @@ use storage::Store;
 use tracing::Instrument as _;
 
 use crate::adapter_info::AdapterInfo;
+use crate::annotation::Lifted;
 use crate::error::DrawError;
 use crate::pipeline::{Limits, Pipeline};
 pub(crate) use drawing::keep;
@@ -80,6 +81,8 @@ pub struct Drawn {
     pub origin: Origin,
     /// Is it in the store? One that somebody waits for and that is stored behind his back is not, yet.
     pub kept: bool,
+    /// Of a part: how far columns of the whole picture go, where it has a height bar.
+    pub lifted: Lifted,
 }
 
 /// Where a picture comes from.

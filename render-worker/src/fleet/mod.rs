@@ -23,6 +23,7 @@ use prometheus::{IntCounterVec, IntGaugeVec, Opts, Registry};
 use storage::Store;
 use tokio::time::Instant;
 
+use crate::annotation::Lifted;
 use crate::desk::{Order, Origin};
 use crate::wire::proto::{DrawReply, DrawRequest, Origin as OriginCode, Storing as StoringCode};
 use crate::wire::{self, Version};
@@ -65,6 +66,8 @@ pub struct Picture {
     pub origin: Origin,
     /// Name of the worker; of all that drew a part of it, with commas.
     pub worker: String,
+    /// Of a part: how far columns of the whole picture go, where it has a height bar.
+    pub lifted: Lifted,
 }
 
 impl Fleet {
@@ -293,6 +296,10 @@ fn picture(member: &Member, reply: DrawReply) -> Picture {
         OriginCode::Drawn | OriginCode::Unspecified => Origin::Drawn,
     };
     Picture {
+        lifted: Lifted {
+            up_kg_m2: reply.up_kg_m2,
+            down_kg_m2: reply.down_kg_m2,
+        },
         bytes: reply.picture,
         origin,
         worker: member.name.clone(),

@@ -18,6 +18,7 @@ use tokio::time::Instant;
 
 use super::member::Member;
 use super::{FleetError, Inner, Picture};
+use crate::annotation::Lifted;
 use crate::desk::{self, Order, Origin, Storing};
 use crate::encoding::Encoders;
 use crate::error::DrawError;
@@ -110,22 +111,25 @@ impl Inner {
                 let decoding = move || decoded(&picture.bytes, strip.size_px);
                 let strip_px = self.parts.encoders.run((), decoding).await;
                 let rgba8 = strip_px.map_err(|e| failed(&e))??;
-                Ok::<_, FleetError>((turn, strip, rgba8, picture.worker))
+                Ok::<_, FleetError>((turn, strip, rgba8, picture.worker, picture.lifted))
             }
         };
         let mut drawing: FuturesUnordered<_> =
             sharing.strips.iter().enumerate().map(drawn).collect();
         let mut image = Image::transparent(job.view.size_px());
         let mut workers = vec![String::new(); sharing.strips.len()];
+        let mut lifted = Lifted::default();
         while let Some(drawn) = drawing.next().await {
-            let (turn, strip, rgba8, worker) = drawn?;
+            let (turn, strip, rgba8, worker, of_all) = drawn?;
+            // The same from all of them.
+            lifted = of_all;
             image.paste(strip.origin_px, strip.size_px, &rgba8);
             workers[turn] = worker;
         }
         drop(drawing);
         workers.dedup();
         let worker = workers.join(", ");
-        let annotated = job.annotations.as_ref().map(|_some| job.clone());
+        let annotated = job.annotations.as_ref().map(|_some| (job.clone(), lifted));
         let encoders = &self.parts.encoders;
         let encoding = encoders.encode(annotated, image, order.encoding, ());
         let bytes = encoding.await.map_err(|e| failed(&e))?;
@@ -135,6 +139,7 @@ impl Inner {
             bytes,
             origin,
             worker,
+            lifted,
         })
     }
 

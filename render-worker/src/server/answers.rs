@@ -41,6 +41,8 @@ impl Renderer for Answers {
             picture: drawn.bytes,
             origin: origin.into(),
             duration_ms: begun.elapsed().as_millis() as u64,
+            up_kg_m2: drawn.lifted.up_kg_m2,
+            down_kg_m2: drawn.lifted.down_kg_m2,
         }))
     }
 

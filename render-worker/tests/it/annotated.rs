@@ -11,7 +11,7 @@ use contract::job::{Mode, RenderJob, View};
 use contract::manifest::Manifest;
 use contract::picture::{PictureOptions, PictureRequest, PictureSources};
 use render::Backend;
-use render_worker::annotation;
+use render_worker::annotation::{self, Lifted};
 use storage::Store;
 
 use crate::here::Here;
@@ -23,6 +23,12 @@ const MOST_BYTES: u64 = 256 << 10;
 /// libraries of other systems.
 const MOST_DIFF: u8 = 6;
 const DIFF_PIXELS_PER_MILLE: usize = 5;
+
+/// Columns of a height bar.
+const LIFTED: Lifted = Lifted {
+    up_kg_m2: 0.045,
+    down_kg_m2: 0.062,
+};
 
 fn golden(name: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden");
@@ -121,7 +127,7 @@ async fn another_drawing_is_another_version() {
         .into_iter()
         .filter_map(|mode| {
             let job = job(&flux, &carbon, mode, AnnotationWishes::all());
-            annotation::drawing(&job).unwrap()
+            annotation::drawing(&job, &LIFTED).unwrap()
         })
         .collect();
     assert_eq!(drawings.len(), Mode::SCALAR.len());

@@ -2,11 +2,12 @@
 
 use std::sync::Arc;
 
-use contract::annotation::Annotations;
+use contract::annotation::{Annotations, HeightScale};
 use contract::encoding::Encoding;
 use contract::job::{Mode, RenderJob};
 use prometheus::Registry;
 use render::Backend;
+use render_worker::annotation::{self, Lifted};
 use render_worker::desk::{Order, Origin, Storing};
 use render_worker::fleet::FleetSettings;
 use storage::Store;
@@ -28,15 +29,19 @@ fn sharing(workers: &[&str]) -> FleetSettings {
     }
 }
 
-/// A view with the date over it, which crosses the edge of strips.
+/// A view with lines and a height bar over it, which cross the edges of strips; how high the bar is nobody knows who draws
+/// a strip.
 fn annotated(job: &RenderJob) -> RenderJob {
     let mut annotated = RenderJob {
         mode: Mode::Volume,
-        view: globe(0.0, 0.0, 2e7, 130),
+        view: globe(-150.0, 30.0, 2e7, 480),
         ..job.clone()
     };
     annotated.annotations = Some(Annotations {
         graticule: Some(contract::annotation::Graticule { step_deg: 10.0 }),
+        height: Some(HeightScale {
+            since: "2000".parse().unwrap(),
+        }),
         ..Annotations::none()
     });
     annotated
@@ -56,6 +61,8 @@ async fn workers_share_a_large_picture_and_its_bytes_are_those_of_one() {
     let alone = Store::memory();
     two_months_in(&alone).await;
     let expected = drawn_here(&alone, &job).await;
+    let bar = annotation::drawing(&job, &Lifted::default()).unwrap();
+    assert!(bar.is_some_and(|svg| svg.contains("given off or taken up here")));
     let workers: Vec<Worker> = (0..3).map(|_| Worker::start(&store, 1, 4)).collect();
     let names: Vec<&str> = workers.iter().map(|w| w.name.as_str()).collect();
     let registry = Registry::new();

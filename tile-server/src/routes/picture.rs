@@ -30,6 +30,10 @@ pub(crate) const HEIGHTS_END: HeaderName = HeaderName::from_static("fluxglobe-he
 /// Pixels that heights end at; only on map tiles so deep that heights to scale may be more.
 pub(crate) const HEIGHTS_WITHIN: HeaderName = HeaderName::from_static("fluxglobe-heights-within");
 
+/// Largest tilt with some of the earth's surface in the picture; only where this one has none.
+pub(crate) const TILT_WITH_GROUND: HeaderName =
+    HeaderName::from_static("fluxglobe-tilt-with-ground");
+
 /// Headers that layers add to an answer.
 const MOST_LAYERED: usize = 10;
 
@@ -86,6 +90,17 @@ fn heights_headers(job: &RenderJob) -> HeaderMap {
     headers
 }
 
+/// That nothing but sky, and what rises over the horizon, is to be seen, and how far a camera may be tilted to see more.
+fn sky_headers(job: &RenderJob) -> HeaderMap {
+    let mut headers = HeaderMap::new();
+    if let Some(deg) = job.view.tilt_with_ground_deg() {
+        let value = format!("{deg} degrees");
+        let value = value.parse().expect("numbers are printable");
+        headers.insert(TILT_WITH_GROUND, value);
+    }
+    headers
+}
+
 /// Everything of an answer but the picture. The entity tag is the job's digest: the same job is the same picture, byte for
 /// byte, so a client that has it is answered without drawing or reading anything.
 pub(crate) struct Head {
@@ -105,6 +120,7 @@ impl Head {
         };
         let mut headers = shown.headers();
         headers.extend(heights_headers(job));
+        headers.extend(sky_headers(job));
         let printable = tag.parse().expect("digits are printable");
         headers.insert(header::ETAG, printable);
         headers.insert(

@@ -100,10 +100,11 @@ const ENDLESS: &str = "/api/events";
 const SWITCHING: &str = "/stream";
 
 /// Headers that not every answer has.
-const OFTEN_ABSENT: [&str; 3] = [
+const OFTEN_ABSENT: [&str; 4] = [
     "fluxglobe-time-covered",
     "fluxglobe-heights-end",
     "fluxglobe-heights-within",
+    "fluxglobe-tilt-with-ground",
 ];
 
 /// Parameters that are free text: no value of theirs is wrong.

@@ -83,6 +83,28 @@ async fn answers_say_where_heights_end_and_where_they_may_be_flattened() {
 }
 
 #[tokio::test]
+async fn a_view_with_nothing_but_sky_says_which_tilt_has_ground() {
+    let app = TestApp::new().await;
+    let of = async |path: &str| {
+        let answer = app.get(path).await;
+        assert_eq!(answer.status, StatusCode::OK, "{path}: {}", answer.text());
+        answer.header("fluxglobe-tilt-with-ground").to_owned()
+    };
+    let from_low = "/globe/flux/volume.png?height_km=5&width=640&height=480&tilt=";
+    assert_eq!(of(&format!("{from_low}150")).await, "110.2 degrees");
+    assert_eq!(of(&format!("{from_low}110.2")).await, "");
+    assert_eq!(
+        of("/globe/flux/volume.png?height_km=-400&tilt=180").await,
+        ""
+    );
+    assert_eq!(of("/tiles/flux/volume/3/0/0.png").await, "");
+    let asked = [("origin", "http://map.example")];
+    let answer = app.get_with(&format!("{from_low}150"), &asked).await;
+    let exposed = answer.header("access-control-expose-headers");
+    assert!(exposed.contains("fluxglobe-tilt-with-ground"), "{exposed}");
+}
+
+#[tokio::test]
 async fn every_mode_has_its_own_picture() {
     let app = TestApp::new().await;
     let mut pictures = vec![];

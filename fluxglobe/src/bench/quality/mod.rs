@@ -1,12 +1,13 @@
 //! `fluxglobe bench quality`: volumes of generated scenes, and of a product if it has landed, against a reference in
 //! double precision; a table, JSON, pictures, and a plot of the error against the number of slices.
 
+mod bounds;
 mod plot;
 pub(super) mod scenes;
 
 use std::path::Path;
 
-use anyhow::{Context as _, Result};
+use anyhow::{Context as _, Result, bail};
 use comfy_table::presets::NOTHING;
 use comfy_table::{CellAlignment, Table};
 use contract::job::{Style, View};
@@ -15,6 +16,7 @@ use serde::Serialize;
 
 use crate::cli::{BenchQuality, Settings};
 use crate::{deployment, progress};
+use bounds::Bounds;
 
 /// What is printed.
 #[derive(Debug, Serialize)]
@@ -32,6 +34,25 @@ pub(super) struct Measured {
 }
 
 pub(crate) async fn run(settings: &Settings, options: BenchQuality) -> Result<()> {
+    let bounds = Bounds {
+        least_psnr_db: options.least_psnr,
+        most_flip: options.most_flip,
+    };
+    bounds.validate()?;
+    let report = measured(settings, &options, &bounds).await?;
+    if let Some(path) = &options.plot {
+        let svg = plot::svg(&report.scenes)?;
+        std::fs::write(path, svg).with_context(|| format!("cannot write {}", path.display()))?;
+    }
+    if options.json {
+        progress::result(&serde_json::to_string_pretty(&report)?)?;
+    } else {
+        progress::result(&format!("drawn by {}\n{}", report.renderer, table(&report)))?;
+    }
+    bounds.hold(&report.scenes)
+}
+
+async fn measured(settings: &Settings, options: &BenchQuality, bounds: &Bounds) -> Result<Report> {
     let outlines = scenes::outlines(
         options.scenes,
         options.only.as_deref(),
@@ -42,6 +63,13 @@ pub(crate) async fn run(settings: &Settings, options: BenchQuality) -> Result<()
     let desk = deployment::single_desk(settings, store.clone()).await?;
     let unlanded = outlines.iter().filter(|outline| outline.needs_product());
     if product.is_none() && unlanded.count() > 0 {
+        if !bounds.is_empty() {
+            bail!(
+                "{} has not landed here, so its scenes cannot be held to anything: `fluxglobe demo` lands it, and \
+                 --only generated leaves them out",
+                options.product
+            );
+        }
         progress::say(&format!(
             "{} has not landed here: generated scenes only",
             options.product
@@ -82,18 +110,10 @@ pub(crate) async fn run(settings: &Settings, options: BenchQuality) -> Result<()
         bar.inc(1);
     }
     progress::done(&bar, "measured");
-    if let Some(path) = &options.plot {
-        let svg = plot::svg(&scenes)?;
-        std::fs::write(path, svg).with_context(|| format!("cannot write {}", path.display()))?;
-    }
-    let report = Report {
+    Ok(Report {
         renderer: desk.pipeline().name().to_owned(),
         scenes,
-    };
-    if options.json {
-        return progress::result(&serde_json::to_string_pretty(&report)?);
-    }
-    progress::result(&format!("drawn by {}\n{}", report.renderer, table(&report)))
+    })
 }
 
 fn table(report: &Report) -> Table {

@@ -3430,6 +3430,8 @@ export interface operations {
                     etag?: string;
                     /** @description Accumulated carbon at which heights end, where particles are lifted by it: columns of more are drawn no higher or deeper */
                     "fluxglobe-heights-end"?: string;
+                    /** @description Largest tilt that has some of the earth's surface in the picture, where this one has none: the camera looks past it, at the sky and at what rises over the horizon */
+                    "fluxglobe-tilt-with-ground"?: string;
                     /** @description The instant that is shown, ISO 8601 */
                     "fluxglobe-time"?: string;
                     /** @description `start/end` of what there is, where another instant is shown than was asked for */
