@@ -73,7 +73,7 @@ pub(crate) struct Budget {
     /// Where the number is from, for the answer: 'Regnier et al. (2022)'.
     #[arg(long, value_name = "TEXT", help_heading = PARTS)]
     pub(crate) river_source: Option<String>,
-    /// Regions that are summed each by itself too and held against --region: a GeoJSON FeatureCollection whose features have
+    /// Regions that are summed each by itself too and held against --region: a GeoJSON `FeatureCollection` whose features have
     /// names, as a file or as text, or a PRODUCT that is a mask, of which each code is a region.
     #[arg(long, value_name = "FILE|PRODUCT", help_heading = PARTS)]
     pub(crate) regions: Option<String>,

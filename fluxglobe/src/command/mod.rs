@@ -33,7 +33,7 @@ use crate::{bench, demo, deployment, services};
 /// Runs a command; the exit code says whether every part of it succeeded.
 pub(crate) async fn run(settings: &Settings, command: Command) -> Result<ExitCode> {
     match command {
-        Command::Demo(options) => return demo::run(settings, options).await,
+        Command::Demo(options) => return Box::pin(demo::run(settings, options)).await,
         Command::Ingest(options) => return ingest::run(settings, options).await,
         Command::Products(options) => match &options.of {
             Some(ProductsOf::FillError(options)) => fill_error::run(settings, options).await?,

@@ -177,6 +177,23 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/products/{product}/budget/history": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** One budget by every version of the product that changed it: what was known when, and what changed it. */
+        get: operations["budget_history"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/products/{product}/correlation": {
         parameters: {
             query?: never;
@@ -523,6 +540,8 @@ export interface components {
         BudgetAnswer: {
             /** @description How cells on the coast counted. */
             cells: components["schemas"]["Cells"];
+            /** @description Do rows sum to their period, and regions to the whole? None of a single row of one region. */
+            closure?: components["schemas"]["Closure"];
             /** @description Figure of the earth for areas. */
             earth: components["schemas"]["Earth"];
             /** @description What estimates of gaps are made of. */
@@ -547,6 +566,10 @@ export interface components {
              * @description Area of the region, land included, m².
              */
             region_area_m2: number;
+            /** @description The same of each part of the region that was asked for by itself. */
+            regions?: components["schemas"]["RegionBudget"][];
+            /** @description The river flux that was taken off, if one was given. */
+            river?: components["schemas"]["RiverFlux"];
             /** @description Rows in the order of time. */
             rows: components["schemas"]["BudgetRow"][];
             /** @description Citation of the product. */
@@ -555,8 +578,28 @@ export interface components {
             synthetic: boolean;
             /** @description Title of the product. */
             title: string;
+            /** @description How uncertainties were reckoned, if they were asked for. */
+            uncertainty?: components["schemas"]["BudgetUncertainty"];
             /** @description Unit of `budget_tg` and `gap_tg`, `Tg C`. */
             unit: string;
+        };
+        /** @description The same budget by the versions of a product that changed it. */
+        BudgetHistory: {
+            /** @description What to know of the dates, and of what is the newest in all rows. */
+            notes: string[];
+            /** @description Product. */
+            product: components["schemas"]["ProductId"];
+            /** @description The region by its name, or as `west,south,east,north`. */
+            region: string;
+            /** @description Unit of `budget_tg` and `difference_tg`, `Tg C`. */
+            unit: string;
+            /**
+             * Format: int64
+             * @description Versions that are kept, whether they changed the budget or not.
+             */
+            version_count: number;
+            /** @description The first version that is kept, and each one that changed what the question reads, oldest first. */
+            versions: components["schemas"]["VersionBudget"][];
         };
         /** @description The budget of one period. */
         BudgetRow: {
@@ -608,14 +651,49 @@ export interface components {
              * @description Area of the region, land included, m².
              */
             region_area_m2: number;
+            /** @description The budget less a river flux, if one was given. */
+            river?: components["schemas"]["RowRiver"];
             /** @description First instant. */
             start: components["schemas"]["TimeMs"];
+            /** @description How uncertain the budget is, if that was asked for. */
+            uncertainty?: components["schemas"]["RowUncertainty"];
         };
         /**
          * @description What one row of a budget covers.
          * @enum {string}
          */
         BudgetStep: "month" | "year" | "total";
+        /** @description How the uncertainty of a budget was reckoned. */
+        BudgetUncertainty: {
+            /** @description What is assumed. */
+            assumptions: string[];
+            /**
+             * Format: double
+             * @description Correlation time, days; 0: each step's error is its own.
+             */
+            correlation_days: number;
+            /**
+             * Format: double
+             * @description Correlation length, km; 0: each cell's error is its own.
+             */
+            correlation_length_km: number;
+            /**
+             * Format: int32
+             * @description Number of draws of the Monte Carlo; none if nothing was drawn.
+             */
+            draws?: number;
+            /** @description The standard error of the flux, as it was stated. */
+            error: string;
+            /** @description The version of the product that holds it; none of a stated one. */
+            manifest?: string;
+            /** @description How the sum over pairs of cells was taken. */
+            scheme: string;
+            /**
+             * Format: int64
+             * @description What its random numbers follow from.
+             */
+            seed?: number;
+        };
         /**
          * @description What part of the year a step belongs to: by the middle of its period.
          * @enum {string}
@@ -753,6 +831,15 @@ export interface components {
              * @description Years that have one.
              */
             years: number;
+        };
+        /** @description Do parts sum to the whole? */
+        Closure: {
+            /** @description The same of regions, if several were asked for. */
+            regions?: components["schemas"]["RegionsClosure"];
+            /** @description Sum of the rows, kg, exact. */
+            rows_kg: string;
+            /** @description The budget of their whole period as one row, kg, exact. */
+            total_kg: string;
         };
         /** @description How complete a row of accumulated carbon is: a cell with one month of twelve is not a complete one. */
         Completeness: {
@@ -1462,6 +1549,25 @@ export interface components {
             /** @description For people. */
             title: string;
         };
+        /** @description The budget of one of several regions. */
+        RegionBudget: {
+            /** @description How it was taken where that may surprise. */
+            notes: string[];
+            /**
+             * Format: double
+             * @description Area of the sea in it, m².
+             */
+            ocean_area_m2: number;
+            /** @description Its name. */
+            region: string;
+            /**
+             * Format: double
+             * @description Its area, land included, m².
+             */
+            region_area_m2: number;
+            /** @description Rows in the order of time. */
+            rows: components["schemas"]["BudgetRow"][];
+        };
         /** @description The mean of a step over a region. */
         RegionValue: {
             /**
@@ -1489,6 +1595,115 @@ export interface components {
         Regions: {
             /** @description In the order they are offered. */
             regions: components["schemas"]["Region"][];
+        };
+        /** @description Regions and what they are parts of, in all of the time: `regions_kg - overlap_kg + left_out_kg = whole_kg`, exactly. */
+        RegionsClosure: {
+            /** @description What lies in the whole and in none of the regions, kg. */
+            left_out_kg: string;
+            /**
+             * Format: double
+             * @description Area of the whole in none of them, land included, m².
+             */
+            left_out_m2: number;
+            /** @description What of it is counted more than once since regions overlap, kg. */
+            overlap_kg: string;
+            /**
+             * Format: double
+             * @description Area that regions share, counted as often as it is one too many, m².
+             */
+            overlap_m2: number;
+            /** @description Sum of the regions, kg. */
+            regions_kg: string;
+            /** @description The regions overlap, or leave something of the whole out, in words. */
+            summary: string;
+            /** @description The whole, kg. */
+            whole_kg: string;
+        };
+        /** @description The river flux that was taken off, and where it is from. */
+        RiverFlux: {
+            /** @description The version of the product that was summed; none of a number. */
+            manifest?: string;
+            /** @description What the rows hold. */
+            meaning: string;
+            /**
+             * Format: double
+             * @description Its standard error, Tg a year, if one was stated.
+             */
+            sigma_tg_per_year?: number;
+            /** @description Where it is from, in the words of who asked, or as its product cites it. */
+            source: string;
+            /**
+             * Format: double
+             * @description Tg of carbon a year of 365.25 days, positive out of the sea; none of a product.
+             */
+            tg_per_year?: number;
+        };
+        /** @description Budgets of one row with random errors added. */
+        RowDraws: {
+            /**
+             * Format: double
+             * @description The budget that 2.5 % of the draws are below, Tg.
+             */
+            p2_5_tg: number;
+            /**
+             * Format: double
+             * @description The budget that 97.5 % of the draws are below, Tg.
+             */
+            p97_5_tg: number;
+            /**
+             * Format: double
+             * @description Its own standard error, by the number of draws, Tg.
+             */
+            sigma_error_tg: number;
+            /**
+             * Format: double
+             * @description Standard deviation of the budgets, Tg.
+             */
+            sigma_tg: number;
+        };
+        /** @description A row less the river flux. */
+        RowRiver: {
+            /**
+             * Format: double
+             * @description The budget less that, Tg: of a net flux of today the anthropogenic part.
+             */
+            anthropogenic_tg: number;
+            /**
+             * Format: double
+             * @description Outgassing of river carbon in the row's time, Tg.
+             */
+            river_tg: number;
+            /**
+             * Format: double
+             * @description One standard error of it, Tg: that of the budget and that of the river flux, if it has one, as independent. None where that
+             *     of the budget was not asked for.
+             */
+            sigma_tg: number | null;
+        };
+        /** @description How uncertain the budget of one row is. */
+        RowUncertainty: {
+            /**
+             * Format: double
+             * @description Share of the area and time with a flux that has an error too, percent; what has none adds nothing to sigma.
+             */
+            error_coverage_percent: number;
+            /**
+             * Format: double
+             * @description What it would be if all cells and steps had one error in common, Tg.
+             */
+            fully_correlated_tg: number;
+            /** @description The same from random errors. */
+            monte_carlo?: components["schemas"]["RowDraws"];
+            /**
+             * Format: double
+             * @description One standard error of the budget, Tg.
+             */
+            sigma_tg: number;
+            /**
+             * Format: double
+             * @description What it would be if no two cells or steps had an error in common, Tg.
+             */
+            uncorrelated_tg: number;
         };
         /**
          * @description How the value at a point is made.
@@ -1814,6 +2029,54 @@ export interface components {
          * @enum {string}
          */
         Verdict: "within" | "outside" | "no_uncertainty_stated";
+        /** @description The budget by one version. */
+        VersionBudget: {
+            /** @description Carbon that left the sea, kg, exact, as decimal text; none where it holds no step in the period. */
+            budget_kg: string | null;
+            /**
+             * Format: double
+             * @description The same in Tg.
+             */
+            budget_tg: number | null;
+            /** @description What it changed of what the question reads, in words. */
+            changed: string;
+            /**
+             * Format: double
+             * @description Share of the region's sea and of the period that holds data, percent.
+             */
+            coverage_percent: number | null;
+            /**
+             * Format: double
+             * @description How far it is from the one before, Tg; none of the first.
+             */
+            difference_tg: number | null;
+            end: components["schemas"]["TimeMs"] | null;
+            /** @description The version. */
+            manifest: string;
+            /** @description When it was written to the store. */
+            published: components["schemas"]["TimeMs"];
+            /**
+             * Format: double
+             * @description One standard error of it, Tg, if uncertainty was asked for.
+             */
+            sigma_tg?: number;
+            start: components["schemas"]["TimeMs"] | null;
+            /**
+             * Format: int64
+             * @description Steps in the period that the version before did not have.
+             */
+            steps_added: number;
+            /**
+             * Format: int64
+             * @description Steps that it has no more.
+             */
+            steps_removed: number;
+            /**
+             * Format: int64
+             * @description Steps whose values it replaced.
+             */
+            steps_replaced: number;
+        };
     };
     responses: never;
     parameters: never;
@@ -2534,6 +2797,36 @@ export interface operations {
                 ocean?: string;
                 /** @description Version, as answers name it; the newest unless one is given. */
                 manifest?: string;
+                /**
+                 * @description The newest version that was published at an instant (ISO 8601 UTC; a day is its first moment), or one by its name. In place
+                 *     of `manifest`.
+                 */
+                as_of?: string;
+                /**
+                 * @description Standard error of the flux: `20%`, a number with its unit such as `0.3 mol m-2 year-1`, or a product of standard errors on
+                 *     the same grid. With it rows say how uncertain they are.
+                 */
+                error?: string;
+                /** @description How far errors of cells go together, km: exp(-d / length). 0 where the error of each cell is its own. */
+                correlation_length_km?: number;
+                /** @description How long errors of steps go together, days: exp(-t / days). 0, the error of each step is its own, unless given. */
+                correlation_days?: number;
+                /** @description Draws of a Monte Carlo, 10 to 10000: a check, and an interval that holds 95 % of the budgets. */
+                monte_carlo?: number;
+                /** @description The same seed draws the same errors; 0 unless given. */
+                seed?: number;
+                /**
+                 * @description Outgassing of river carbon that is taken off, Tg of carbon a year out of the sea, with its standard error if there is one
+                 *     (`650` or `650±300`), or a product that is summed over the same region.
+                 */
+                river_flux?: string;
+                /** @description Where the number is from; needed with it. */
+                river_source?: string;
+                /**
+                 * @description Parts of the region that are asked for by themselves too, and held against the whole: a GeoJSON `FeatureCollection` whose
+                 *     features have names, or a product that is a mask, of which each code is a part.
+                 */
+                regions?: string;
             };
             header?: never;
             path: {
@@ -2551,6 +2844,128 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["BudgetAnswer"];
+                };
+            };
+            /** @description A parameter is not valid, or missing; the reason says what would be */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description Nothing of that name; the reason says where names are listed */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description A defect of this server */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description Too much to do, or a part that is needed does not answer */
+            503: {
+                headers: {
+                    /** @description Seconds after which the same request may succeed */
+                    "retry-after"?: number;
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description The answer took too long */
+            504: {
+                headers: {
+                    /** @description Seconds after which the same request may succeed */
+                    "retry-after"?: number;
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+        };
+    };
+    budget_history: {
+        parameters: {
+            query?: {
+                /**
+                 * @description `global` (the default), a name that `/api/regions` lists, `west,south,east,north` in degrees, GeoJSON or
+                 *     well-known text.
+                 */
+                region?: string;
+                /** @description First instant, ISO 8601 UTC; the product's own unless one is given. */
+                from?: string;
+                /** @description First instant after the period; the product's own unless one is given. */
+                to?: string;
+                /** @description What a row covers; `total` unless told otherwise. */
+                step?: components["schemas"]["BudgetStep"];
+                /** @description Figure of the earth for areas; `wgs84` unless one is given. */
+                earth?: components["schemas"]["Earth"];
+                /** @description How cells on the coast count; `whole` unless told otherwise. */
+                cells?: components["schemas"]["Cells"];
+                /** @description Landed product whose cells say how much of them is sea or land, in place of Natural Earth. */
+                ocean?: string;
+                /** @description Version, as answers name it; the newest unless one is given. */
+                manifest?: string;
+                /**
+                 * @description The newest version that was published at an instant (ISO 8601 UTC; a day is its first moment), or one by its name. In place
+                 *     of `manifest`.
+                 */
+                as_of?: string;
+                /**
+                 * @description Standard error of the flux: `20%`, a number with its unit such as `0.3 mol m-2 year-1`, or a product of standard errors on
+                 *     the same grid. With it rows say how uncertain they are.
+                 */
+                error?: string;
+                /** @description How far errors of cells go together, km: exp(-d / length). 0 where the error of each cell is its own. */
+                correlation_length_km?: number;
+                /** @description How long errors of steps go together, days: exp(-t / days). 0, the error of each step is its own, unless given. */
+                correlation_days?: number;
+                /** @description Draws of a Monte Carlo, 10 to 10000: a check, and an interval that holds 95 % of the budgets. */
+                monte_carlo?: number;
+                /** @description The same seed draws the same errors; 0 unless given. */
+                seed?: number;
+                /**
+                 * @description Outgassing of river carbon that is taken off, Tg of carbon a year out of the sea, with its standard error if there is one
+                 *     (`650` or `650±300`), or a product that is summed over the same region.
+                 */
+                river_flux?: string;
+                /** @description Where the number is from; needed with it. */
+                river_source?: string;
+                /**
+                 * @description Parts of the region that are asked for by themselves too, and held against the whole: a GeoJSON `FeatureCollection` whose
+                 *     features have names, or a product that is a mask, of which each code is a part.
+                 */
+                regions?: string;
+            };
+            header?: never;
+            path: {
+                /** @description Name of a carbon flux or of accumulated carbon */
+                product: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description A line for each version that changed it */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["BudgetHistory"];
                 };
             };
             /** @description A parameter is not valid, or missing; the reason says what would be */
