@@ -237,6 +237,8 @@ async fn sums_begin_anew_in_every_shard() {
         "global",
         "POLYGON((101 0.5,263.7 2,250 15.2,104 14,101 0.5),(150 6,151 6,151 9,150 6))",
         "105.04,0,105.12,8",
+        // Begins and ends within shards.
+        "103.3,0,250.07,16",
     ] {
         both.agree_on(&asked(region, KNOWN)).await;
     }
