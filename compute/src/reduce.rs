@@ -14,6 +14,8 @@ mod kernel;
 mod order;
 mod over_steps;
 mod percentiles;
+mod question;
+mod reduction;
 mod region_sums;
 pub(crate) mod remembered;
 mod run;

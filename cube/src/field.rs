@@ -12,8 +12,8 @@ use zarrs::array::{
 
 use crate::arrays::{self, Definition};
 use crate::layout::RUN_STEPS;
-use crate::sums::Basis;
 use crate::summing::records;
+use crate::sums::Basis;
 use crate::{CubeError, Description, Layout};
 
 /// Writes fields of one grid as objects of the layout.

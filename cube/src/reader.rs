@@ -11,6 +11,7 @@ use tokio::sync::RwLock;
 use zarrs::array::{Array, AsyncArrayShardedReadableExt as _, AsyncArrayShardedReadableExtCache};
 use zarrs_icechunk::AsyncIcechunkStore;
 
+use crate::arrays::SERIES;
 use crate::blocks::Blocks;
 use crate::error::first_lines;
 use crate::field::Decoder;
@@ -19,7 +20,6 @@ use crate::object_storage::ObjectStorage;
 use crate::series::Runs;
 use crate::sums::Sums;
 use crate::unreadable::Object;
-use crate::arrays::SERIES;
 use crate::{CubeError, Description, Layout, Step, arrays, axis};
 
 /// Chunks that are read and decoded at a time.

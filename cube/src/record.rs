@@ -74,7 +74,11 @@ impl Record {
         self.is_summed = match bytes.first() {
             Some(0) => true,
             Some(&UNSUMMED) => false,
-            other => return Err(format!("it begins with {other:?}, as no record of sums does")),
+            other => {
+                return Err(format!(
+                    "it begins with {other:?}, as no record of sums does"
+                ));
+            }
         };
         let mut planes = bytes[HEADER_BYTES..].chunks_exact(RUN_STEPS);
         let mut word = |count: usize| {

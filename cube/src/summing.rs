@@ -8,12 +8,7 @@ const SIDE: usize = BLOCK_CELLS as usize;
 
 /// Records of all blocks of a shard, row by row. `values` are `[row, col, step]`, stored unit, NaN no data, of whole blocks in
 /// `cols` columns; `row_weights` is what a cell of each row weighs, fewer where the grid ends.
-pub(crate) fn records(
-    values: &[f32],
-    cols: usize,
-    row_weights: &[i64],
-    scale: Scale,
-) -> Vec<u8> {
+pub(crate) fn records(values: &[f32], cols: usize, row_weights: &[i64], scale: Scale) -> Vec<u8> {
     let row_values = cols * RUN_STEPS;
     let rows = values.len() / row_values;
     let mut out = vec![0; rows / SIDE * (cols / SIDE) * RECORD_BYTES];

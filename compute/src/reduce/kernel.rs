@@ -63,32 +63,50 @@ impl Equal {
     }
 
     /// Adds what was added up to `out`, with the cells' weight.
-    fn flush(&mut self, scale: Scale, out: &mut [StepSums]) -> Result<(), OutOfRange> {
+    fn flush(
+        &mut self,
+        scale: Scale,
+        with_squares: bool,
+        out: &mut [StepSums],
+    ) -> Result<(), OutOfRange> {
         if self.cell_count == 0 {
             return Ok(());
         }
+        self.check(scale)?;
         let CellWeight { weight, covered } = self.weight;
         for (step, own) in out.iter_mut().enumerate() {
+            // Below 2⁵⁰: as many cells as are summed, of a weight each.
             let count = self.counts[step];
-            if count == 0 {
-                continue;
+            own.count += count.unsigned_abs();
+            own.weight += i128::from(count * weight);
+            own.covered += i128::from(count * covered);
+            own.sum += i128::from(self.sums[step]) * i128::from(weight);
+            own.min = own.min.min(self.mins[step]);
+            own.max = own.max.max(self.maxs[step]);
+        }
+        if with_squares {
+            for (own, squares) in out.iter_mut().zip(&self.squares) {
+                own.squares += i128::from(*squares) * i128::from(weight);
             }
-            let (min, max) = (self.mins[step], self.maxs[step]);
-            for value in [min, max] {
-                if !scale.holds(value) {
+        }
+        self.clear(out.len());
+        Ok(())
+    }
+
+    /// Is there nothing beyond anything physical?
+    fn check(&self, scale: Scale) -> Result<(), OutOfRange> {
+        let low = self.mins.iter().copied().fold(f32::INFINITY, f32::min);
+        let high = self.maxs.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+        if low > high || (scale.holds(low) && scale.holds(high)) {
+            return Ok(());
+        }
+        for (step, count) in self.counts.iter().enumerate() {
+            for value in [self.mins[step], self.maxs[step]] {
+                if *count > 0 && !scale.holds(value) {
                     return Err(OutOfRange(value.into()));
                 }
             }
-            let weighed = |sum: i64| i128::from(sum) * i128::from(weight);
-            own.count += count.unsigned_abs();
-            own.weight += weighed(count);
-            own.covered += i128::from(count) * i128::from(covered);
-            own.sum += weighed(self.sums[step]);
-            own.squares += weighed(self.squares[step]);
-            own.min = own.min.min(min);
-            own.max = own.max.max(max);
         }
-        self.clear(out.len());
         Ok(())
     }
 }
@@ -148,7 +166,7 @@ impl Summing {
             }
             let row = &mut self.rows[if is_block { cell / ROWS } else { 0 }];
             if row.weight != *weight || row.cell_count == MOST_CELLS {
-                row.flush(scale, &mut self.out[self.steps.clone()])?;
+                row.flush(scale, with_squares, &mut self.out[self.steps.clone()])?;
                 row.weight = *weight;
             }
             row.add(values.steps(cell, self.steps.len()), scale, with_squares);
@@ -158,7 +176,11 @@ impl Summing {
 
     fn flush(&mut self) -> Result<(), OutOfRange> {
         for row in &mut self.rows {
-            row.flush(self.scale, &mut self.out[self.steps.clone()])?;
+            row.flush(
+                self.scale,
+                self.with_squares,
+                &mut self.out[self.steps.clone()],
+            )?;
         }
         Ok(())
     }

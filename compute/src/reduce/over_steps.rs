@@ -7,9 +7,9 @@ use cube::scale::Scale;
 use cube::weight_unit::WeightUnit;
 
 use super::cells::Cells;
+use super::question::{Question, Wanted};
 use super::region_sums::RegionStepSums;
 use super::run::{opened, run};
-use super::task::{Question, Wanted};
 use super::tasks::Version;
 use crate::budget::Measure;
 use crate::region::loaded::RegionWeights;

@@ -11,7 +11,7 @@ use contract::time::Period;
 use super::bins::{BinSums, times};
 use super::histogram::{Buckets, Histograms};
 use super::order::{number_of, value_of};
-use super::task::Wanted;
+use super::question::Wanted;
 
 /// Most buckets of all ranges of a pass together, in bits: 32 MiB of weights.
 const PASS_BITS: u32 = 21;

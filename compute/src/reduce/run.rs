@@ -12,7 +12,8 @@ use datafusion::arrow::array::{Array as _, AsArray as _, RecordBatch};
 use futures::{StreamExt as _, TryStreamExt as _, stream};
 
 use super::accumulator::Accumulated;
-use super::task::{Piece, Question, Task, Worker};
+use super::question::{Piece, Question};
+use super::task::{Task, Worker};
 use crate::scan;
 use crate::session::QueryContext;
 use crate::{ComputeError, Engine};

@@ -1,128 +1,24 @@
 //! A piece of a question: some blocks of a run of steps, or chunks of a field, read, reduced and forgotten.
 
-use std::collections::{BTreeMap, BTreeSet};
-use std::ops::Range;
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use contract::chunk::Window;
-use contract::digest::Digest;
-use contract::grid::Grid;
-use contract::key::ObjectKey;
-use contract::time::Period;
-use cube::scale::Scale;
-use cube::weight_unit::WeightUnit;
 use cube::{BLOCK_CELLS, EncodedBlocks, EncodedSums, RUN_STEPS, Undecoded};
 use serde::{Deserialize, Serialize};
 use storage::rows::Stored;
 use storage::{StorageError, fields};
 
-use super::accumulator::{Accumulated, too_large};
-use super::cells::{self, CellWeight, Cells, Shape, block};
-use super::histogram::Buckets;
-use super::inside::InsideRun;
-use super::kernel::{Summing, Target, add_weights};
-use super::region_sums::{CellArea, RegionScratch, RegionStepSums};
+use super::accumulator::Accumulated;
+use super::cells::{self, Cells, block};
+use super::question::{Layout, Piece, Question, Wanted};
+use super::reduction::{CellShares, Reduction};
 use super::stored::{Stored as StoredSums, Terms};
 use super::values::Values;
 use crate::ComputeError;
-use crate::budget::Measure;
-use crate::budget::fixed::OutOfRange;
 use crate::objects::Objects;
 
 use crate::region::loaded::{RegionWeights, weights_failed};
-
-/// What is asked of every piece.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-pub(super) struct Question {
-    pub(super) shape: Shape,
-    /// Address of the weights, or the question that they answer.
-    pub(super) whole: String,
-    /// The same of what coverage counts.
-    pub(super) covered: String,
-    pub(super) unit: WeightUnit,
-    pub(super) scale: Scale,
-    pub(super) wanted: Wanted,
-}
-
-impl Question {
-    /// What the sums of all steps of a run are remembered by, `run` being what names its values; none of what is no sum.
-    pub(super) fn sums_name(&self, run: &Digest) -> Option<Digest> {
-        let Wanted::Sums {
-            with_squares,
-            with_extremes,
-        } = self.wanted
-        else {
-            return None;
-        };
-        let weights = (self.shape, &self.whole, &self.covered, self.unit);
-        let wanted = (with_squares, with_extremes);
-        Some(Digest::of_json(&(run, weights, self.scale, wanted)))
-    }
-
-    /// How values count in stored sums that it can be answered from, if it can be from any: they know no extremes.
-    pub(super) fn in_stored_sums(&self) -> Option<Scale> {
-        match self.wanted {
-            Wanted::Sums { with_extremes, .. } => (!with_extremes).then_some(self.scale),
-            Wanted::Histograms { .. } | Wanted::RegionSums { .. } => None,
-        }
-    }
-}
-
-/// What is accumulated.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub(super) enum Wanted {
-    /// Sums by step.
-    Sums {
-        /// Those of squares too.
-        with_squares: bool,
-        /// The smallest and the largest value too.
-        with_extremes: bool,
-    },
-    /// Weights by ranges of values.
-    Histograms {
-        ranges: Vec<Buckets>,
-        /// By the index of a step, the ranges that it adds to and the time it has in each one's bin.
-        steps: BTreeMap<u32, Vec<(u32, i64)>>,
-    },
-    /// Mass and area over a region and, by bands of latitude, its sea; the weights of coverage are those of the sea.
-    RegionSums {
-        /// Whose bands.
-        grid: Grid,
-        /// What is summed.
-        measure: Measure,
-    },
-}
-
-/// Values to read.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-pub(super) struct Piece {
-    /// Name of the object; of blocks that of the field of their first step.
-    pub(super) key: ObjectKey,
-    /// Where queries read it; nowhere in particular if it holds blocks.
-    pub(super) address: String,
-    pub(super) layout: Layout,
-    /// Index of its first step in the version.
-    pub(super) first_step: u32,
-    /// Steps of it that are reduced, counted from its first.
-    pub(super) steps: Range<u32>,
-    /// Numbers of blocks or chunks, increasing.
-    pub(super) rows: Vec<u32>,
-    /// Blocks whose stored sums are read.
-    pub(super) inside: Vec<InsideRun>,
-}
-
-/// How values lie where they are read.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub(super) enum Layout {
-    /// Time-major: a row a block, `[cell, step]`. Only a process that has opened the version reads it.
-    Blocks,
-    /// Stored sums of blocks. Only a process that has opened the version reads them.
-    Sums,
-    /// A row a chunk of one step.
-    Field(Period),
-}
 
 /// Some pieces of a question, as they are handed to a process.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -341,7 +237,7 @@ impl Worker {
         blocks: &EncodedBlocks,
     ) -> Result<Result<Accumulated, ComputeError>, Undecoded> {
         let windows = cells::blocks(self.question.shape);
-        let mut reduction = Reduction::of(self, piece);
+        let mut reduction = Reduction::of(&self.question, piece, self.seconds(piece));
         let mut failed = None;
         blocks.each(|number, values| {
             let cells = self.cells_of(windows[piece.rows[number] as usize], true);
@@ -379,7 +275,7 @@ impl Worker {
         windows: &[Window],
         each: impl FnOnce(&mut Take<'_>) -> Result<(), ComputeError>,
     ) -> Result<Accumulated, ComputeError> {
-        let mut reduction = Reduction::of(self, piece);
+        let mut reduction = Reduction::of(&self.question, piece, self.seconds(piece));
         let steps = piece.steps.start as usize..piece.steps.end as usize;
         each(&mut |row: u32, values: &[f32]| {
             let cells = self.cells_of(windows[row as usize], false);
@@ -434,123 +330,5 @@ impl Worker {
                 })
             }
         }
-    }
-}
-
-/// What cells have of a geometry, row by row.
-enum CellShares {
-    Weights(Vec<CellWeight>),
-    Areas(Vec<CellArea>),
-}
-
-/// What is accumulated of a piece.
-struct Reduction<'a> {
-    question: &'a Question,
-    piece: &'a Piece,
-    targets: Vec<Target>,
-    sums: Option<Summing>,
-    regions: Vec<RegionStepSums>,
-    /// Of each step what its values are multiplied with besides the area; nothing where no sums over a region are wanted.
-    seconds: Vec<f64>,
-    all: Accumulated,
-}
-
-impl<'a> Reduction<'a> {
-    fn of(worker: &'a Worker, piece: &'a Piece) -> Self {
-        let seconds = worker.seconds(piece);
-        let is_of_region = matches!(worker.question.wanted, Wanted::RegionSums { .. });
-        let steps = piece.steps.len();
-        let sums = match worker.question.wanted {
-            Wanted::Sums { with_squares, .. } => {
-                Some(Summing::new(steps, worker.question.scale, with_squares))
-            }
-            Wanted::Histograms { .. } | Wanted::RegionSums { .. } => None,
-        };
-        Self {
-            seconds,
-            question: &worker.question,
-            piece,
-            targets: piece.targets(&worker.question.wanted),
-            sums,
-            regions: vec![RegionStepSums::default(); if is_of_region { steps } else { 0 }],
-            all: Accumulated::default(),
-        }
-    }
-
-    /// Adds values whose summed steps are `steps` of the piece, counted from its first summed one.
-    fn add(
-        &mut self,
-        values: Values<'_>,
-        cells: &CellShares,
-        steps: Range<usize>,
-    ) -> Result<(), ComputeError> {
-        let refused = |e: OutOfRange| ComputeError::inconsistent(self.piece.key.as_str(), e);
-        match (&self.question.wanted, cells) {
-            (Wanted::Sums { .. }, CellShares::Weights(cells)) => match &mut self.sums {
-                Some(sums) => sums.add(values, cells, steps).map_err(refused),
-                None => Ok(()),
-            },
-            (Wanted::Histograms { ranges, .. }, CellShares::Weights(cells)) => {
-                let own = self.targets.iter().filter(|it| steps.contains(&it.step));
-                let own = own.map(|it| Target {
-                    step: it.step - steps.start,
-                    ranges: it.ranges.clone(),
-                });
-                let own: Vec<Target> = own.collect();
-                let added = add_weights(values, cells, &own, ranges, &mut self.all.histograms);
-                added.ok_or_else(too_large)
-            }
-            (Wanted::RegionSums { .. }, CellShares::Areas(cells)) => {
-                let (seconds, sums) = (&self.seconds[steps.clone()], &mut self.regions[steps]);
-                let mut scratch = RegionScratch::new(seconds.len());
-                scratch.add(values, cells, seconds, sums).map_err(refused)
-            }
-            _ => Err(ComputeError::inconsistent(
-                self.piece.key.as_str(),
-                "its cells are not what is summed",
-            )),
-        }
-    }
-
-    fn accumulated(mut self) -> Result<Accumulated, ComputeError> {
-        let first = self.piece.first_step + self.piece.steps.start;
-        if let Some(sums) = self.sums {
-            let sums = sums.finish();
-            let sums = sums.map_err(|e| ComputeError::inconsistent(self.piece.key.as_str(), e))?;
-            let with_extremes = matches!(
-                self.question.wanted,
-                Wanted::Sums {
-                    with_extremes: true,
-                    ..
-                }
-            );
-            // Stored sums know none: those of the rest would be some of all.
-            let own = sums.into_iter().map(|own| match with_extremes {
-                true => own,
-                false => own.without_extremes(),
-            });
-            let own = (first..).zip(own);
-            self.all
-                .steps
-                .extend(own.filter(|(_, sums)| sums.count > 0));
-        }
-        self.all.regions.extend((first..).zip(self.regions));
-        Ok(self.all)
-    }
-}
-
-impl Piece {
-    /// Ranges that its steps add to.
-    fn targets(&self, wanted: &Wanted) -> Vec<Target> {
-        let Wanted::Histograms { steps, .. } = wanted else {
-            return vec![];
-        };
-        let first = self.first_step + self.steps.start;
-        let own = steps.range(first..self.first_step + self.steps.end);
-        let target = |(step, ranges): (&u32, &Vec<(u32, i64)>)| Target {
-            step: (step - first) as usize,
-            ranges: ranges.clone(),
-        };
-        own.map(target).collect()
     }
 }

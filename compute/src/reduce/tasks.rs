@@ -13,7 +13,7 @@ use storage::Store;
 
 use super::cells::Cells;
 use super::inside::{Inside, InsideRun};
-use super::task::{Layout, Piece};
+use super::question::{Layout, Piece};
 
 /// Values that a piece holds at once, bytes before compression.
 const PIECE_BYTES: u64 = 8 << 20;
@@ -69,9 +69,9 @@ impl Version<'_> {
             if wanted.is_empty() {
                 continue;
             }
-            let inside = parts.of(self.values.and_then(|values| {
-                values.summed_as(&(run.start as usize..run.end as usize))
-            }));
+            let inside = parts.of(self
+                .values
+                .and_then(|values| values.summed_as(&(run.start as usize..run.end as usize))));
             if are_fields_less(&run, wanted.len(), inside.read_counts(), chunks.len()) {
                 continue;
             }

@@ -80,12 +80,16 @@ impl Weighed {
             earth: query.earth,
             ocean: query.ocean.as_deref(),
         };
-        let mut extent = extent_of(engine, asked).await?;
-        let address = weights(engine, manifest, asked).await?;
-        let (whole, sea) = (
-            loaded(engine, &address.all).await?,
-            loaded(engine, &address.ocean).await?,
-        );
+        // Each takes some ten milliseconds of a region that nobody asked for before.
+        let weighing = async {
+            let address = weights(engine, manifest, asked).await?;
+            let (whole, sea) =
+                futures::try_join!(loaded(engine, &address.all), loaded(engine, &address.ocean))?;
+            Ok::<_, ComputeError>((address, whole, sea))
+        };
+        let (extent, weighed) = futures::join!(extent_of(engine, asked), weighing);
+        let mut extent = extent?;
+        let (address, whole, sea) = weighed?;
         let unit = unit_of_areas(&manifest.grid, query.earth, &whole);
         if query.ocean.is_some() {
             extent = with_shares(extent, total(&whole), total(&sea));

@@ -118,7 +118,9 @@ async fn summed_version(grid: Grid) -> Manifest {
     for step in 0..SUMMED_STEPS {
         let mut own = blank.clone();
         own.period = month(step as u32 + 1);
-        let values: Vec<f32> = (0..grid.cell_count()).map(|cell| flux(step, cell)).collect();
+        let values: Vec<f32> = (0..grid.cell_count())
+            .map(|cell| flux(step, cell))
+            .collect();
         let digest = fields::digest_of(&grid, &values, own.period);
         own.field = ObjectKey::field(&manifest.product, &digest);
         manifest.steps.push(own);
@@ -136,7 +138,9 @@ async fn frozen_sums_are_those_of_their_values() {
         let repository = made.unwrap();
         let mut edit = Edit::begin(&repository).await.unwrap();
         for step in 0..SUMMED_STEPS {
-            let values: Arc<[f32]> = (0..grid.cell_count()).map(|cell| flux(step, cell)).collect();
+            let values: Arc<[f32]> = (0..grid.cell_count())
+                .map(|cell| flux(step, cell))
+                .collect();
             edit.put(month(step as u32 + 1), values).await.unwrap();
         }
         edit.commit("to freeze").await.unwrap();

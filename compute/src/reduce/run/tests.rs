@@ -9,7 +9,7 @@ use datafusion::arrow::util::pretty::pretty_format_batches;
 use storage::Store;
 
 use super::*;
-use crate::reduce::task::{Layout, Wanted};
+use crate::reduce::question::{Layout, Wanted};
 
 fn question() -> Question {
     Question {

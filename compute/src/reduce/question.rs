@@ -1,0 +1,110 @@
+//! What is asked of values, and which values it is asked of: plain data, as it passes from process to process.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+use contract::digest::Digest;
+use contract::grid::Grid;
+use contract::key::ObjectKey;
+use contract::time::Period;
+use cube::scale::Scale;
+use cube::weight_unit::WeightUnit;
+use serde::{Deserialize, Serialize};
+
+use super::cells::Shape;
+use super::histogram::Buckets;
+use super::inside::InsideRun;
+use crate::budget::Measure;
+
+/// What is asked of every piece.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(super) struct Question {
+    pub(super) shape: Shape,
+    /// Address of the weights, or the question that they answer.
+    pub(super) whole: String,
+    /// The same of what coverage counts.
+    pub(super) covered: String,
+    pub(super) unit: WeightUnit,
+    pub(super) scale: Scale,
+    pub(super) wanted: Wanted,
+}
+
+impl Question {
+    /// What the sums of all steps of a run are remembered by, `run` being what names its values; none of what is no sum.
+    pub(super) fn sums_name(&self, run: &Digest) -> Option<Digest> {
+        let Wanted::Sums {
+            with_squares,
+            with_extremes,
+        } = self.wanted
+        else {
+            return None;
+        };
+        let weights = (self.shape, &self.whole, &self.covered, self.unit);
+        let wanted = (with_squares, with_extremes);
+        Some(Digest::of_json(&(run, weights, self.scale, wanted)))
+    }
+
+    /// How values count in stored sums that it can be answered from, if it can be from any: they know no extremes.
+    pub(super) fn in_stored_sums(&self) -> Option<Scale> {
+        match self.wanted {
+            Wanted::Sums { with_extremes, .. } => (!with_extremes).then_some(self.scale),
+            Wanted::Histograms { .. } | Wanted::RegionSums { .. } => None,
+        }
+    }
+}
+
+/// What is accumulated.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(super) enum Wanted {
+    /// Sums by step.
+    Sums {
+        /// Those of squares too.
+        with_squares: bool,
+        /// The smallest and the largest value too.
+        with_extremes: bool,
+    },
+    /// Weights by ranges of values.
+    Histograms {
+        ranges: Vec<Buckets>,
+        /// By the index of a step, the ranges that it adds to and the time it has in each one's bin.
+        steps: BTreeMap<u32, Vec<(u32, i64)>>,
+    },
+    /// Mass and area over a region and, by bands of latitude, its sea; the weights of coverage are those of the sea.
+    RegionSums {
+        /// Whose bands.
+        grid: Grid,
+        /// What is summed.
+        measure: Measure,
+    },
+}
+
+/// Values to read.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(super) struct Piece {
+    /// Name of the object; of blocks that of the field of their first step.
+    pub(super) key: ObjectKey,
+    /// Where queries read it; nowhere in particular if it holds blocks.
+    pub(super) address: String,
+    pub(super) layout: Layout,
+    /// Index of its first step in the version.
+    pub(super) first_step: u32,
+    /// Steps of it that are reduced, counted from its first.
+    pub(super) steps: Range<u32>,
+    /// Numbers of blocks or chunks, increasing.
+    pub(super) rows: Vec<u32>,
+    /// Blocks whose stored sums are read.
+    pub(super) inside: Vec<InsideRun>,
+}
+
+/// How values lie where they are read.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(super) enum Layout {
+    /// Time-major: a row a block, `[cell, step]`. Only a process that has opened the version reads it.
+    Blocks,
+    /// Stored sums of blocks. Only a process that has opened the version reads them.
+    Sums,
+    /// A row a chunk of one step.
+    Field(Period),
+}
