@@ -241,7 +241,8 @@ async fn values_of_fields_and_along_time_are_the_same() {
         let engine = Engine::in_process(store.clone(), parts(2));
         let values = engine.values(&manifest, &manifest.id()).await.unwrap();
         let query = asked(geometry.clone(), "mean,std,p90,min", StatisticsStep::Season);
-        let answer = compute::reduce::statistics_of(&engine, &query, &manifest, manifest.id()).await;
+        let answer =
+            compute::reduce::statistics_of(&engine, &query, &manifest, manifest.id()).await;
         (answer.unwrap().rows, values.time_major().len())
     };
     let mut fields = vec![];

@@ -55,7 +55,7 @@ mod tests {
     use chrono::SecondsFormat;
 
     #[test]
-    fn the_text_is_the_librarys() {
+    fn the_text_is_that_of_the_library() {
         let mut ms: i64 = -62_135_596_800_000; // the start of year 1
         let mut count = 0;
         while let Some(utc) = DateTime::from_timestamp_millis(ms).filter(|t| t.year() <= 9999) {
