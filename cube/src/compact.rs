@@ -312,3 +312,74 @@ fn turn(maps: &[Vec<f32>], window: Window, cols: usize, first: usize, turned: &m
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use contract::grid::Grid;
+    use contract::quantity::Quantity;
+    use contract::time::{Period, TimeMs};
+
+    use super::*;
+    use crate::{Description, Edit};
+
+    const GRID: Grid = Grid {
+        rows: 9,
+        cols: 20,
+        north_deg: 45.0,
+        west_deg: 0.0,
+        dlat_deg: 1.0,
+        dlon_deg: 1.0,
+    };
+
+    #[tokio::test]
+    async fn runs_of_before_get_their_sums_and_keep_their_values() {
+        let store = Store::memory();
+        let description = Description {
+            product: "p".parse().unwrap(),
+            title: "P".to_owned(),
+            quantity: Quantity::CarbonFlux,
+            synthetic: true,
+            source: "a test".to_owned(),
+            grid: GRID,
+            version: None,
+        };
+        let made = Repository::create(&store, "p", &description).await;
+        let repository = made.unwrap();
+        let mut edit = Edit::begin(&repository).await.unwrap();
+        let day = |at: usize| TimeMs::new(at as i64 * 86_400_000).unwrap();
+        for step in 0..RUN_STEPS {
+            let value = |cell: usize| (cell % 7 * step) as f32 * 1e-11;
+            let values = (0..GRID.cell_count()).map(value).collect();
+            let period = Period::new(day(step), day(step + 1)).unwrap();
+            edit.put(period, values).await.unwrap();
+        }
+        edit.commit("steps").await.unwrap();
+        assert_eq!(compact(&store, "p").await.unwrap(), 1);
+        let before = repository.at(&At::Newest).await.unwrap();
+        assert!(before.is_summed(0));
+        compare(&before, 0).await.unwrap();
+        // As a program left it that knew of no sums.
+        let session = repository.session().await.unwrap();
+        let mut session = session.write().await;
+        let sums = Path::new("/sums").unwrap();
+        session.delete_group(sums).await.unwrap();
+        session.commit("none").execute().await.unwrap();
+        drop(session);
+        let without = repository.at(&At::Newest).await.unwrap();
+        assert!(!without.is_summed(0) && without.sums_name().is_none());
+        assert_eq!(without.first_missing(), Some(0));
+        assert_eq!(compact(&store, "p").await.unwrap(), 1);
+        let after = repository.at(&At::Newest).await.unwrap();
+        assert!(after.is_summed(0));
+        compare(&after, 0).await.unwrap();
+        assert_eq!(after.runs(), before.runs());
+        let of = async |cube: &Cube| {
+            let records = cube.records_of_shard(0, [0, 0]).await.unwrap();
+            let values = cube.shard(0, [0, 0]).await.unwrap().unwrap();
+            let bits: Vec<u32> = values.iter().map(|value| value.to_bits()).collect();
+            (records, bits)
+        };
+        assert!(of(&after).await == of(&before).await);
+        assert_eq!(compact(&store, "p").await.unwrap(), 0);
+    }
+}
