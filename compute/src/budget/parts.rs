@@ -1,13 +1,12 @@
-//! Parts beside the whole: rows of time beside their period, regions beside the region that they are parts of.
+//! Parts beside the whole: regions beside the region that they are parts of.
 
-use contract::budget::{
-    BudgetAnswer, BudgetParts, BudgetQuery, BudgetRow, Closure, RegionBudget, RegionsClosure,
-};
+use contract::budget::{BudgetAnswer, BudgetParts, BudgetQuery, RegionBudget, RegionsClosure};
 use contract::manifest::Manifest;
 use contract::region::{AskedRegion, Polygon, Region};
 
-use super::fixed::{MASS_DECIMALS, decimal_text, steps_of_text};
-use super::query::of_region;
+use super::closure::{mass_steps, of_time};
+use super::fixed::{MASS_DECIMALS, decimal_text};
+use super::of_region::of_region;
 use crate::region::extent::region_area_m2;
 use crate::region::mask;
 use crate::{ComputeError, Engine};
@@ -15,23 +14,6 @@ use crate::{ComputeError, Engine};
 /// Share of an area that regions may share, leave out or reach beyond before it is worth a word: areas are rounded.
 const AREA_SLACK: f64 = 1e-9;
 const M2_PER_MILLION_KM2: f64 = 1e12;
-
-/// What rows sum to beside their period as one row; none if a sum leaves 128 bits.
-pub(super) fn of_time(rows: &[BudgetRow], total: &[BudgetRow]) -> Option<Closure> {
-    Some(Closure {
-        rows_kg: decimal_text(mass_steps(rows)?, MASS_DECIMALS),
-        total_kg: decimal_text(mass_steps(total)?, MASS_DECIMALS),
-        regions: None,
-    })
-}
-
-/// Sum of rows, kg in steps of 10⁻⁹.
-fn mass_steps(rows: &[BudgetRow]) -> Option<i128> {
-    let mut steps = rows
-        .iter()
-        .map(|row| steps_of_text(&row.budget_kg, MASS_DECIMALS));
-    steps.try_fold(0i128, |sum, own| sum.checked_add(own?))
-}
 
 /// Adds the budgets of parts of the region to an answer, and what they come to beside it.
 ///

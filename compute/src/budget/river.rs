@@ -5,7 +5,7 @@ use contract::manifest::Manifest;
 use contract::quantity::{Quantity, SECONDS_PER_YEAR};
 use contract::time::Period;
 
-use super::query::of_region;
+use super::of_region::of_region;
 use crate::{ComputeError, Engine};
 
 const MEANING: &str = "anthropogenic_tg is the budget less river_tg, the outgassing of carbon that rivers bring, positive out of the \

@@ -193,10 +193,11 @@ async fn every_code_of_a_mask_is_a_region() {
         &wavy_year(&ONE_DEGREE),
     )
     .await;
+    // Between 10 and 50 degrees east: 15 north to the equator, to 10 south in two parts, and nothing to 20 south.
     let code = |cell: usize| match (cell / 360, cell % 360) {
-        (0..60, _) => 1.0,
-        (60..150, 0..100) => 2.0,
-        (60..150, _) => 3.0,
+        (75..90, 190..230) => 1.0,
+        (90..100, 190..200) => 2.0,
+        (90..100, 200..230) => 3.0,
         _ => f32::NAN,
     };
     let codes: Vec<f32> = (0..ONE_DEGREE.cell_count()).map(code).collect();
@@ -206,7 +207,7 @@ async fn every_code_of_a_mask_is_a_region() {
     let engine = Engine::local(store);
     let query = BudgetQuery {
         parts: Some(BudgetParts::Mask(Arc::clone(&mask))),
-        ..total(&id, "global")
+        ..total(&id, "10,-20,50,15")
     };
     let answer = ask(&engine, &query).await;
     let names: Vec<_> = answer
@@ -221,7 +222,7 @@ async fn every_code_of_a_mask_is_a_region() {
         "{}",
         own.summary
     );
-    let south = ask(&engine, &total(&id, "-180,-90,180,-60")).await;
+    let south = ask(&engine, &total(&id, "10,-20,50,-10")).await;
     let (left, south) = (
         own.left_out_kg.parse::<f64>().unwrap(),
         &south.rows[0].budget_kg,

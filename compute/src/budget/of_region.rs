@@ -1,0 +1,95 @@
+//! The budget of one region: its weights, exact sums of every step, calendar rows with how uncertain they are.
+
+use contract::budget::{BudgetAnswer, BudgetQuery, BudgetStep};
+use contract::manifest::{Manifest, Step};
+use contract::quantity::Quantity;
+use contract::time::Period;
+use storage::manifests;
+
+use super::accumulated;
+use super::closure::of_time;
+use super::gaps::BASIS;
+use super::measure::Measure;
+use super::over_region::{AskedArea, over_region};
+use super::rows::{Asked, row_periods, rows};
+use super::uncertainty;
+use crate::{ComputeError, Engine};
+
+/// The budget of one region, without what is held against it.
+pub(super) async fn of_region(
+    engine: &Engine,
+    query: &BudgetQuery,
+    manifest: &Manifest,
+) -> Result<BudgetAnswer, ComputeError> {
+    let (window, steps) = query.steps(manifest)?;
+    if manifest.quantity != Quantity::AccumulatedCarbon {
+        return of_flux(engine, query, manifest, (window, &steps)).await;
+    }
+    let (Some(source), Some(extent)) = (&manifest.derived_from, manifest.extent()) else {
+        return Err(ComputeError::NotAFlux {
+            product: manifest.product.clone(),
+            quantity: manifest.quantity,
+        });
+    };
+    let source = manifests::load(engine.store(), source).await?;
+    let since = Some(window.start.max(extent.start));
+    let (window, steps) = source.steps_inside(since, Some(window.end))?;
+    let answer = of_flux(engine, query, &source, (window, &steps)).await?;
+    accumulated::completed(engine, query, manifest, answer).await
+}
+
+async fn of_flux(
+    engine: &Engine,
+    query: &BudgetQuery,
+    manifest: &Manifest,
+    (window, steps): (Period, &[&Step]),
+) -> Result<BudgetAnswer, ComputeError> {
+    let over = over_region(engine, manifest, steps, AskedArea::of(query), Measure::Mass).await?;
+    let (sums, extent) = (over.sums, over.extent);
+    let asked = Asked {
+        region_area_m2: extent.area_m2,
+        ocean_area_m2: extent.ocean_m2,
+        sea_steps: sums.sea_steps,
+        cells: query.cells,
+    };
+    let too_large =
+        || ComputeError::inconsistent(manifest.id().to_string(), "its sums exceed 128 bits");
+    let rows_of = |periods: &[Period]| rows(periods, &sums.steps, &asked).ok_or_else(too_large);
+    let mut rows = rows_of(&row_periods(window, query.step)?)?;
+    let closure = match query.step {
+        BudgetStep::Total => None,
+        BudgetStep::Month | BudgetStep::Year => {
+            Some(of_time(&rows, &rows_of(&[window])?).ok_or_else(too_large)?)
+        }
+    };
+    let mut basis = None;
+    if let Some(errors) = &query.errors {
+        let flux = (manifest, steps);
+        let uncertain = uncertainty::of_rows(engine, query, errors, flux, &rows).await?;
+        for (row, own) in rows.iter_mut().zip(uncertain.rows) {
+            row.uncertainty = Some(own);
+        }
+        basis = Some(uncertain.basis);
+    }
+    Ok(BudgetAnswer {
+        product: manifest.product.clone(),
+        manifest: manifest.id(),
+        title: manifest.title.clone(),
+        source: manifest.source.clone(),
+        synthetic: manifest.synthetic,
+        region: query.region_name.clone(),
+        earth: query.earth,
+        cells: query.cells,
+        ocean_source: over.ocean_source,
+        unit: "Tg C".to_owned(),
+        region_area_m2: extent.area_m2,
+        ocean_area_m2: extent.ocean_m2,
+        gap_basis: BASIS.to_owned(),
+        notes: extent.notes,
+        uncertainty: basis,
+        river: None,
+        rows,
+        regions: vec![],
+        closure,
+    })
+}
