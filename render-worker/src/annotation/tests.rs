@@ -373,6 +373,16 @@ fn both_sides_of_a_height_bar_are_to_one_scale_where_they_are_cut_short() {
 }
 
 #[test]
+fn a_shorter_side_that_is_cut_short_has_a_number_too() {
+    let near = view(1600, 900, 2.5e6, 45.0);
+    let svg = bar_of(near, 2e7, 0.0443, 0.0219);
+    assert!(
+        svg.contains("given off</text>") && svg.contains("taken up</text>"),
+        "{svg}"
+    );
+}
+
+#[test]
 fn where_heights_end_is_told_on_the_bar_or_in_words() {
     // Seen from above it has no length, and nothing of that height is drawn where nothing lifts.
     let above = view(1600, 900, 6e6, 0.0);

@@ -112,11 +112,15 @@ impl Side<'_> {
             Way::Up => 1.0,
             Way::Down => -1.0,
         };
-        let own: Vec<f64> = rounds
-            .iter()
-            .map(|round| round * sign)
-            .filter(|round| *round > 0.0)
-            .collect();
+        let far_enough = |value: &f64| {
+            *value > 0.0 && self.ruler.px(self.way, display.stored(*value)) >= TICKS_EM * em
+        };
+        let own = rounds.iter().map(|round| round * sign);
+        let mut own: Vec<f64> = own.filter(far_enough).collect();
+        if own.is_empty() {
+            // The shorter side may end before the first number of both.
+            own = ticks::of(0.0, end).into_iter().filter(far_enough).collect();
+        }
         let texts = ticks::texts(&own);
         let is_whole = share >= 1.0;
         let mut marks: Vec<(f64, String)> = own
