@@ -12,6 +12,7 @@ mod observations;
 mod pictures;
 mod services;
 mod show;
+mod sql;
 mod statistics;
 mod surroundings;
 mod upkeep;
@@ -47,6 +48,7 @@ pub(crate) use services::{
     TileServer, Topics,
 };
 pub(crate) use show::settings as shown_settings;
+pub(crate) use sql::{SqlFormat, SqlQuestion};
 pub(crate) use statistics::{StatisticsOptions, Stats, StatsLine, StatsPoint, StatsPolygon};
 pub(crate) use surroundings::Surroundings;
 pub(crate) use upkeep::{Gc, Recompute, RecomputeWhat, Survey, Verify};
@@ -145,6 +147,8 @@ pub(crate) enum Command {
     /// Series at a place or over a region.
     #[command(subcommand)]
     Stats(Stats),
+    /// Ask products by SQL: a table a product, a row a cell and step; read only.
+    Sql(SqlQuestion),
     /// Integrate a flux over a region and time (Tg C, positive out of the sea).
     Budget(Budget),
     /// Compute a product from others: by an expression, the flux of CO2, another grid, or accumulated.
