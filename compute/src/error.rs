@@ -70,6 +70,34 @@ pub enum ComputeError {
         /// What is wrong and what to do.
         reason: String,
     },
+    /// SQL that makes no sense, or would do more than read.
+    #[error("SQL: {reason}")]
+    Sql {
+        /// What is wrong and what to do.
+        reason: String,
+    },
+    /// SQL that would take longer than it may.
+    #[error(
+        "the question was ended after {limit_s} s, its limit of time; ask for less (times and places in WHERE are read alone) or allow more"
+    )]
+    QueryTime {
+        /// The limit, s.
+        limit_s: f64,
+    },
+    /// SQL that must hold more than it may.
+    #[error(
+        "the question must hold more than {limit_mib} MiB, its limit of memory; ask for less: groups, sorted rows and a side of a join are held"
+    )]
+    QueryMemory {
+        /// The limit, MiB.
+        limit_mib: usize,
+    },
+    /// A server that anybody could ask, or a token that is none.
+    #[error("access: {reason}")]
+    Access {
+        /// What is wrong and what to do.
+        reason: String,
+    },
     /// A value from outside that is not valid.
     #[error(transparent)]
     Contract(#[from] ContractError),
@@ -157,6 +185,10 @@ impl ComputeError {
             | Self::Uncertainty { .. }
             | Self::RegionFile { .. }
             | Self::Expression { .. }
+            | Self::Sql { .. }
+            | Self::QueryTime { .. }
+            | Self::QueryMemory { .. }
+            | Self::Access { .. }
             | Self::SchedulerUrl { .. }
             | Self::Contract(_) => ErrorClass::BadRequest,
             Self::Storage(e) => retryable_if(e.is_retryable()),

@@ -30,6 +30,7 @@ mod retry_store;
 mod scan;
 pub mod service;
 mod session;
+pub mod sql;
 mod standalone;
 mod state;
 pub mod stats;

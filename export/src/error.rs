@@ -16,6 +16,9 @@ pub enum ExportError {
     /// A library refused.
     #[error("cannot write {path}: {detail}")]
     Library { path: String, detail: String },
+    /// An answer that a form of file cannot hold.
+    #[error("{reason}")]
+    Form { reason: String },
     /// More or other values than there should be.
     #[error("a step has {found} values where its grid has {cells}")]
     Shape { found: usize, cells: usize },

@@ -1,8 +1,9 @@
 //! A version of a product as files that others' programs open: NetCDF-4, GeoTIFF, Parquet. Values are those that are stored,
-//! bit for bit; what is written is whole or not there, and never takes the place of anything.
+//! bit for bit; what is written is whole or not there, and never takes the place of anything. So are answers of SQL ([`answer`]).
 //!
 //! Zarr and Icechunk are the crate `cube`'s. Left out on purpose: where steps come from.
 
+pub mod answer;
 mod error;
 mod geotiff;
 mod netcdf;

@@ -13,6 +13,7 @@ mod observations;
 mod pictures;
 mod services;
 mod show;
+mod sql;
 mod statistics;
 mod surroundings;
 mod upkeep;
@@ -46,6 +47,7 @@ pub(crate) use services::{
     TileServer, Topics,
 };
 pub(crate) use show::settings as shown_settings;
+pub(crate) use sql::{SqlFormat, SqlQuestion};
 pub(crate) use statistics::{StatisticsOptions, Stats, StatsLine, StatsPoint, StatsPolygon};
 pub(crate) use surroundings::Surroundings;
 pub(crate) use upkeep::{Gc, Recompute, RecomputeWhat, Survey, Verify};
@@ -144,6 +146,8 @@ pub(crate) enum Command {
     /// Series at a place or over a region.
     #[command(subcommand)]
     Stats(Stats),
+    /// Ask products by SQL: a table a product, a row a cell and step; read only.
+    Sql(SqlQuestion),
     /// Integrate a flux over a region and time (Tg C, positive out of the sea).
     Budget(Box<Budget>),
     /// Compute a product from others: by an expression, the flux of CO2, another grid, or accumulated.

@@ -93,8 +93,13 @@ pub(crate) fn region_engine(settings: &Settings, store: Store) -> Result<Engine>
     if let Some(scheduler) = &settings.cluster {
         return cluster(settings, store, scheduler);
     }
+    Ok(in_process(settings, store))
+}
+
+/// DataFusion in this process, whatever cluster there is.
+pub(crate) fn in_process(settings: &Settings, store: Store) -> Engine {
     let parts = parts_in_process(settings, store.is_remote());
-    Ok(Engine::in_process(store, parts))
+    Engine::in_process(store, parts)
 }
 
 fn cluster(settings: &Settings, store: Store, scheduler: &str) -> Result<Engine> {

@@ -49,9 +49,53 @@ pub fn scale<T: H5Type>(file: &File, name: &str, values: &[T]) -> hdf5::Result<D
         .shape([values.len()])
         .create(name)?;
     dataset.write_raw(values)?;
-    fixed(&dataset, "CLASS", "DIMENSION_SCALE")?;
-    fixed(&dataset, "NAME", name)?;
+    mark(&dataset, name)?;
     Ok(dataset)
+}
+
+/// Makes a dataset a dimension's scale.
+fn mark(dataset: &Dataset, name: &str) -> hdf5::Result<()> {
+    fixed(dataset, "CLASS", "DIMENSION_SCALE")?;
+    fixed(dataset, "NAME", name)
+}
+
+/// Values of a chunk of what grows.
+const GROWING_CHUNK: usize = 1 << 16;
+/// Level of deflate: higher ones gain little on measurements.
+const DEFLATE_LEVEL: u8 = 4;
+
+/// A variable of one dimension that grows, empty yet, compressed.
+///
+/// # Errors
+/// It cannot be made.
+pub fn growing<T: H5Type>(file: &File, name: &str) -> hdf5::Result<Dataset> {
+    file.new_dataset::<T>()
+        .obj_track_times(false)
+        .chunk([GROWING_CHUNK])
+        .shuffle()
+        .deflate(DEFLATE_LEVEL)
+        .shape((0..,))
+        .create(name)
+}
+
+/// The same as a coordinate variable, which is also the dimension's scale.
+///
+/// # Errors
+/// It cannot be made.
+pub fn growing_scale<T: H5Type>(file: &File, name: &str) -> hdf5::Result<Dataset> {
+    let dataset = growing::<T>(file, name)?;
+    mark(&dataset, name)?;
+    Ok(dataset)
+}
+
+/// Adds values behind the first `count` of a variable that grows.
+///
+/// # Errors
+/// They cannot be written.
+pub fn grow<T: H5Type>(dataset: &Dataset, count: usize, values: &[T]) -> hdf5::Result<()> {
+    let end = count + values.len();
+    dataset.resize([end])?;
+    dataset.write_slice(values, count..end)
 }
 
 /// A text as the dimension scales of HDF5 want it: of fixed length, with a null character at its end.

@@ -174,7 +174,7 @@ fn block_bytes(run: &Range<u32>) -> u64 {
 }
 
 /// Would less be read of single fields than of a run of steps?
-fn are_fields_less(
+pub(crate) fn are_fields_less(
     run: &Range<u32>,
     wanted: usize,
     [record_count, block_count]: [usize; 2],

@@ -47,6 +47,8 @@ mod recomputed;
 #[cfg(test)]
 mod regions;
 #[cfg(test)]
+mod sql;
+#[cfg(test)]
 mod statistics;
 #[cfg(test)]
 mod stored_sums;

@@ -39,13 +39,29 @@ const GRID: Grid = Grid {
 
 /// A store that counts the requests for fields, and the bytes that it hands out of them.
 #[derive(Debug)]
-struct Counting {
+pub(crate) struct Counting {
     inner: Arc<dyn ObjectStore>,
     field_bytes: AtomicU64,
     field_requests: AtomicU64,
 }
 
 impl Counting {
+    pub(crate) fn of(inner: Arc<dyn ObjectStore>) -> Self {
+        Self {
+            inner,
+            field_bytes: AtomicU64::new(0),
+            field_requests: AtomicU64::new(0),
+        }
+    }
+
+    pub(crate) fn bytes(&self) -> u64 {
+        self.field_bytes.load(Ordering::Relaxed)
+    }
+
+    pub(crate) fn requests(&self) -> u64 {
+        self.field_requests.load(Ordering::Relaxed)
+    }
+
     fn count(&self, at: &Path, bytes: u64) {
         if at.as_ref().contains("frames/") {
             self.field_bytes.fetch_add(bytes, Ordering::Relaxed);
@@ -149,19 +165,14 @@ struct Read {
 
 async fn read(store: &Store, manifest: &Manifest, region: &str) -> Read {
     let (root, inner) = store.sql_root();
-    let counting = Arc::new(Counting {
-        inner,
-        field_bytes: AtomicU64::new(0),
-        field_requests: AtomicU64::new(0),
-    });
+    let counting = Arc::new(Counting::of(inner));
     let objects = Objects::new(root, Arc::clone(&counting) as Arc<dyn ObjectStore>);
     // One task: the end of a file that two tasks share is read by both when they start at once.
     let engine = Engine::in_process(store.clone(), parts(1)).reading(objects);
     ask(&engine, &total(&manifest.product, region)).await;
-    let count = |of: &AtomicU64| of.load(Ordering::Relaxed) as f64;
     Read {
-        share: count(&counting.field_bytes) / field_bytes(store, manifest).await as f64,
-        requests: count(&counting.field_requests) / manifest.steps.len() as f64,
+        share: counting.bytes() as f64 / field_bytes(store, manifest).await as f64,
+        requests: counting.requests() as f64 / manifest.steps.len() as f64,
     }
 }
 

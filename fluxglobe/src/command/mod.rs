@@ -17,6 +17,7 @@ mod recompute;
 mod rejected;
 pub(crate) mod render;
 pub(crate) mod serve;
+mod sql;
 mod statistics;
 mod stats;
 mod survey;
@@ -52,6 +53,7 @@ pub(crate) async fn run(settings: &Settings, command: Command) -> Result<ExitCod
         Command::Stats(Stats::Hovmoller(options)) => {
             analysis::hovmoller(settings, &options).await?;
         }
+        Command::Sql(options) => sql::run(settings, &options).await?,
         Command::Budget(options) => budget::run(settings, &options).await?,
         Command::Derive(options) => {
             derive::run(settings, *options).await?;

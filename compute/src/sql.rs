@@ -1,0 +1,26 @@
+//! SQL for analysts: a question as text in, rows out, read only and within limits of memory and time.
+//!
+//! A table a product, a row a cell and step. Filters on time and place become the steps and chunks that are read, and a
+//! product is never held: rows come out in batches. Everything runs in this process, in one part, so that the same question
+//! has the same bits on any machine; reading and decoding ahead use its other processors (docs/decisions/031).
+
+mod about;
+mod axes;
+mod columns;
+mod mean_weighted;
+mod product_table;
+mod reads;
+mod rows;
+mod running;
+mod scan;
+mod selection;
+mod session;
+mod statement;
+mod statistics;
+mod tables;
+mod version;
+mod yielding;
+
+pub use running::Rows;
+pub(crate) use session::{CATALOG, SCHEMA};
+pub use session::{Sql, SqlLimits};

@@ -1,0 +1,271 @@
+//! Who answers SQL: a session a question, with tables of its own, memory of its own and a time that it may take.
+
+use std::num::NonZeroUsize;
+use std::sync::Arc;
+use std::time::Duration;
+
+use datafusion::arrow::datatypes::{Schema, SchemaRef};
+use datafusion::catalog::{
+    CatalogProvider as _, CatalogProviderList as _, MemoryCatalogProvider,
+    MemoryCatalogProviderList, SchemaProvider as _,
+};
+use datafusion::execution::SendableRecordBatchStream;
+use datafusion::execution::context::{SQLOptions, SessionContext};
+use datafusion::execution::disk_manager::{DiskManagerBuilder, DiskManagerMode};
+use datafusion::execution::memory_pool::{GreedyMemoryPool, TrackConsumersPool};
+use datafusion::execution::runtime_env::RuntimeEnvBuilder;
+use datafusion::execution::session_state::{SessionState, SessionStateBuilder};
+use datafusion::logical_expr::AggregateUDF;
+use datafusion::physical_plan::execute_stream;
+use datafusion::prelude::SessionConfig;
+use tokio::time::{Instant, timeout_at};
+
+use super::mean_weighted::MeanWeighted;
+use super::rows::BATCH_ROWS;
+use super::running::{Rows, Turn, overdue, told};
+use super::statement::{LARGE, statement};
+use super::statistics::{self, StatisticsFunction};
+use super::tables::Tables;
+use super::yielding::Yielding;
+use crate::expression::udf::number_functions;
+use crate::{ComputeError, Engine};
+
+/// Catalog of the tables.
+pub(crate) const CATALOG: &str = "fluxglobe";
+/// Their schema.
+pub(crate) const SCHEMA: &str = "public";
+/// Consumers of memory that a log line names.
+const TOLD_CONSUMERS: NonZeroUsize = NonZeroUsize::new(3).expect("it is not 0");
+
+/// What one question may take.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SqlLimits {
+    /// For what it must hold: groups, sorted rows, a side of a join.
+    pub memory_bytes: usize,
+    /// From its text to its last row.
+    pub time: Duration,
+}
+
+/// Answers SQL over the products of an engine. Clones share it.
+#[derive(Clone)]
+pub struct Sql {
+    engine: Engine,
+    limits: SqlLimits,
+    /// Settings and functions; sessions add tables and memory.
+    state: SessionState,
+}
+
+/// A question that was understood, and what it would answer.
+struct Planned {
+    schema: SchemaRef,
+    stream: SendableRecordBatchStream,
+}
+
+impl Sql {
+    /// # Errors
+    /// A function of ours is called as one of the engine's.
+    pub fn new(engine: &Engine, limits: SqlLimits) -> Result<Self, ComputeError> {
+        let mut builder = SessionStateBuilder::new().with_default_features();
+        if let Some(functions) = builder.scalar_functions() {
+            functions.retain(|it| !LARGE.contains(&it.name()));
+            functions.extend(number_functions().map(Arc::new));
+        }
+        if let Some(functions) = builder.aggregate_functions() {
+            functions.push(Arc::new(AggregateUDF::from(MeanWeighted::new())));
+        }
+        let builder = builder.with_physical_optimizer_rule(Arc::new(Yielding));
+        let mut state = builder.with_config(config()).build();
+        let statistics = Arc::new(StatisticsFunction::new(engine));
+        state.register_udtf(statistics::NAME, statistics);
+        Ok(Self {
+            engine: engine.clone(),
+            limits,
+            state,
+        })
+    }
+
+    /// The engine whose products it reads.
+    pub fn engine(&self) -> &Engine {
+        &self.engine
+    }
+
+    /// The answer to a question, whose rows are computed as they are taken.
+    ///
+    /// # Errors
+    /// `Sql`: it makes no sense, or would do more than read; what [`Rows::next`] says.
+    pub async fn ask(&self, text: &str) -> Result<Rows, ComputeError> {
+        self.ask_in_turn(text, None).await
+    }
+
+    /// The same, holding a turn until the work on it ends.
+    pub(crate) async fn ask_in_turn(&self, text: &str, turn: Turn) -> Result<Rows, ComputeError> {
+        let deadline = Instant::now() + self.limits.time;
+        // A plan may take long by itself: it is made where it can be left.
+        let (own, text) = (self.clone(), text.to_owned());
+        let planning = Aborted(tokio::spawn(async move { own.planned(&text).await }));
+        let planned = self.in_time(deadline, planning).await?;
+        Ok(Rows::start(
+            planned.schema,
+            planned.stream,
+            deadline,
+            self.limits,
+            turn,
+        ))
+    }
+
+    /// Columns of the answer to a question, which is not worked on.
+    ///
+    /// # Errors
+    /// As [`Sql::ask`].
+    pub async fn columns(&self, text: &str) -> Result<SchemaRef, ComputeError> {
+        let deadline = Instant::now() + self.limits.time;
+        let (own, text) = (self.clone(), text.to_owned());
+        let planning = Aborted(tokio::spawn(async move {
+            let (context, tables) = own.context().await?;
+            let frame = own.frame(&context, &tables, &text).await?;
+            Ok(Arc::clone(frame.schema().inner()))
+        }));
+        self.in_time(deadline, planning).await
+    }
+
+    /// Every table there is, and its columns where they are wanted.
+    ///
+    /// # Errors
+    /// A store that does not answer.
+    pub(crate) async fn tables(
+        &self,
+        with_columns: bool,
+    ) -> Result<Vec<(String, SchemaRef)>, ComputeError> {
+        let tables = Tables::of(&self.engine).await?;
+        let mut listed = vec![];
+        for name in tables.table_names() {
+            let columns = if with_columns {
+                let found = tables.table(&name).await;
+                let found = found.map_err(|error| told(error, Some(self.limits)))?;
+                found.map(|table| table.schema())
+            } else {
+                None
+            };
+            listed.push((name, columns.unwrap_or_else(|| Arc::new(Schema::empty()))));
+        }
+        Ok(listed)
+    }
+
+    async fn in_time<T>(
+        &self,
+        deadline: Instant,
+        mut work: Aborted<Result<T, ComputeError>>,
+    ) -> Result<T, ComputeError> {
+        match timeout_at(deadline, &mut work.0).await {
+            Ok(ended) => ended.map_err(|e| ComputeError::inconsistent("the query engine", e))?,
+            Err(_elapsed) => Err(overdue(self.limits)),
+        }
+    }
+
+    async fn planned(&self, text: &str) -> Result<Planned, ComputeError> {
+        let (context, tables) = self.context().await?;
+        let frame = self.frame(&context, &tables, text).await?;
+        let failed = |error| told(error, Some(self.limits));
+        let plan = frame.create_physical_plan().await.map_err(failed)?;
+        Ok(Planned {
+            schema: plan.schema(),
+            stream: execute_stream(plan, context.task_ctx()).map_err(failed)?,
+        })
+    }
+
+    async fn frame(
+        &self,
+        context: &SessionContext,
+        tables: &Tables,
+        text: &str,
+    ) -> Result<datafusion::dataframe::DataFrame, ComputeError> {
+        let statement = statement(text)?;
+        let failed = |error| self.with_advice(told(error, Some(self.limits)), tables);
+        let plan = context
+            .state()
+            .statement_to_plan(statement)
+            .await
+            .map_err(failed)?;
+        let reading = SQLOptions::new()
+            .with_allow_ddl(false)
+            .with_allow_dml(false)
+            .with_allow_statements(false);
+        reading
+            .verify_plan(&plan)
+            .map_err(|error| ComputeError::Sql {
+                reason: format!("{}: SQL here reads only", error.strip_backtrace()),
+            })?;
+        context.execute_logical_plan(plan).await.map_err(failed)
+    }
+
+    /// A session for one question.
+    async fn context(&self) -> Result<(SessionContext, Arc<Tables>), ComputeError> {
+        let tables = Arc::new(Tables::of(&self.engine).await?);
+        let failed = || ComputeError::engine("starting a session");
+        let catalog = MemoryCatalogProvider::new();
+        let registered = catalog.register_schema(SCHEMA, Arc::clone(&tables) as _);
+        registered.map_err(failed())?;
+        let catalogs = MemoryCatalogProviderList::new();
+        catalogs.register_catalog(CATALOG.to_owned(), Arc::new(catalog));
+        let pool = GreedyMemoryPool::new(self.limits.memory_bytes);
+        // Nothing is written, intermediate rows neither.
+        let disk = DiskManagerBuilder::default().with_mode(DiskManagerMode::Disabled);
+        let runtime = RuntimeEnvBuilder::new()
+            .with_memory_pool(Arc::new(TrackConsumersPool::new(pool, TOLD_CONSUMERS)))
+            .with_disk_manager_builder(disk)
+            .build_arc();
+        let state = SessionStateBuilder::new_from_existing(self.state.clone())
+            .with_catalog_list(Arc::new(catalogs))
+            .with_runtime_env(runtime.map_err(failed())?)
+            .build();
+        Ok((SessionContext::new_with_state(state), tables))
+    }
+
+    /// An error with what to do about it, where that is known.
+    fn with_advice(&self, error: ComputeError, tables: &Tables) -> ComputeError {
+        let ComputeError::Sql { reason } = error else {
+            return error;
+        };
+        let large = LARGE.iter().find(|name| {
+            let quoted = format!("function '{name}'");
+            reason.to_lowercase().contains(&quoted)
+        });
+        let advice = if let Some(name) = large {
+            format!("{name} is left out: its values are as large as a number says")
+        } else if reason.contains("table '") && reason.contains("not found") {
+            let names: Vec<_> = tables.products().iter().map(ToString::to_string).collect();
+            let names = if names.is_empty() {
+                "none yet".to_owned()
+            } else {
+                names.join(", ")
+            };
+            format!(
+                "products are {names}; write - as _, or the name in double quotes, and a version as \"NAME@12\""
+            )
+        } else {
+            return ComputeError::Sql { reason };
+        };
+        ComputeError::Sql {
+            reason: format!("{reason}; {advice}"),
+        }
+    }
+}
+
+/// Work that ends when nobody waits for it any more.
+struct Aborted<T>(tokio::task::JoinHandle<T>);
+
+impl<T> Drop for Aborted<T> {
+    fn drop(&mut self) {
+        self.0.abort();
+    }
+}
+
+/// In one part: sums of floating-point numbers depend on their order, and an answer must not depend on the machine.
+fn config() -> SessionConfig {
+    SessionConfig::new()
+        .with_target_partitions(1)
+        .with_batch_size(BATCH_ROWS)
+        .with_information_schema(true)
+        .with_default_catalog_and_schema(CATALOG, SCHEMA)
+        .with_create_default_catalog_and_schema(false)
+}

@@ -1,0 +1,105 @@
+//! Text in, the one statement that may be asked out; whatever would write or read elsewhere is refused with the reason.
+
+use datafusion::sql::parser::{DFParserBuilder, Statement};
+use datafusion::sql::sqlparser::ast::{SetExpr, Statement as Ansi};
+
+use super::running::told;
+use crate::ComputeError;
+
+/// Longest text of a question: nobody writes more by hand, and programs need not.
+const MAX_BYTES: usize = 256 << 10;
+/// What may be asked.
+const MAY: &str = "SELECT, WITH, VALUES, EXPLAIN, SHOW and DESCRIBE";
+
+/// Functions of the engine whose value is as large as a number says, which no limit of memory sees.
+pub(super) const LARGE: [&str; 9] = [
+    "repeat",
+    "lpad",
+    "rpad",
+    "array_repeat",
+    "list_repeat",
+    "array_resize",
+    "list_resize",
+    "range",
+    "generate_series",
+];
+
+/// The statement of a text.
+///
+/// # Errors
+/// `Sql`: it is no SQL, more than one statement, or does more than ask.
+pub(super) fn statement(text: &str) -> Result<Statement, ComputeError> {
+    if text.len() > MAX_BYTES {
+        let bytes = text.len();
+        return refused(&format!(
+            "{bytes} bytes are more than the {MAX_BYTES} of a question"
+        ));
+    }
+    let parsed = DFParserBuilder::new(text).build();
+    let parsed = parsed.and_then(|mut parser| parser.parse_statements());
+    let mut statements = parsed.map_err(|error| with_hint(told(error, None)))?;
+    let statement = statements.pop_front();
+    let Some(statement) = statement else {
+        return refused(&format!("it is empty; give one of {MAY}"));
+    };
+    if !statements.is_empty() {
+        return refused("it is more than one statement; ask one at a time");
+    }
+    check(&statement)?;
+    Ok(statement)
+}
+
+/// What most who write the name of a product for the first time need to know.
+fn with_hint(error: ComputeError) -> ComputeError {
+    match error {
+        ComputeError::Sql { reason } if reason.contains("found: -") => ComputeError::Sql {
+            reason: format!(
+                "{reason}; a name with - in it is written with _, or stands in double quotes"
+            ),
+        },
+        other => other,
+    }
+}
+
+fn check(statement: &Statement) -> Result<(), ComputeError> {
+    match statement {
+        Statement::Statement(own) => match own.as_ref() {
+            Ansi::Query(query) => match *query.body {
+                SetExpr::Insert(_)
+                | SetExpr::Update(_)
+                | SetExpr::Delete(_)
+                | SetExpr::Merge(_) => refused(&reads_only(&query.body.to_string())),
+                _ => Ok(()),
+            },
+            Ansi::ExplainTable { .. }
+            | Ansi::ShowTables { .. }
+            | Ansi::ShowColumns { .. }
+            | Ansi::ShowFunctions { .. }
+            | Ansi::ShowVariable { .. } => Ok(()),
+            Ansi::Explain { statement, .. } if matches!(**statement, Ansi::Query(_)) => Ok(()),
+            other => refused(&reads_only(&other.to_string())),
+        },
+        Statement::Explain(explained) => check(&explained.statement),
+        Statement::CopyTo(_) => refused(
+            "COPY writes files: give --format and --output, which write what a question answers",
+        ),
+        Statement::CreateExternalTable(_) => refused(
+            "CREATE EXTERNAL TABLE reads files: land them with `fluxglobe ingest`, then they are a product",
+        ),
+        Statement::Reset(_) => refused(&reads_only("RESET")),
+    }
+}
+
+fn reads_only(text: &str) -> String {
+    let word = text.split_whitespace().next().unwrap_or_default();
+    format!(
+        "{} is refused: SQL here reads only, by {MAY}",
+        word.to_uppercase()
+    )
+}
+
+fn refused<T>(reason: &str) -> Result<T, ComputeError> {
+    Err(ComputeError::Sql {
+        reason: reason.to_owned(),
+    })
+}

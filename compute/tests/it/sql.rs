@@ -1,0 +1,617 @@
+//! SQL over products: what it answers, what it reads for it, and what it refuses.
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use compute::reduce::statistics;
+use compute::sql::{Sql, SqlLimits};
+use compute::{ComputeError, Engine, Objects};
+use contract::earth::Earth;
+use contract::geometry::AskedGeometry;
+use contract::grid::{Grid, LonLatDeg};
+use contract::quantity::Quantity;
+use contract::statistics::StatisticsQuery;
+use contract::time::{Period, TimeMs};
+use datafusion::arrow::array::{Array as _, AsArray as _, RecordBatch};
+use datafusion::arrow::compute::concat_batches;
+use datafusion::arrow::datatypes::{Float32Type, Float64Type, Int64Type, TimestampMillisecondType};
+use datafusion::arrow::util::display::array_value_to_string;
+use object_store::ObjectStore;
+use storage::Store;
+
+use crate::fixture::{folder_store, land, months, parts, product, wavy_year};
+use crate::reading::Counting;
+
+/// A grid of 3 x 2 chunks, across the date line.
+const GRID: Grid = Grid {
+    rows: 130,
+    cols: 150,
+    north_deg: 65.0,
+    west_deg: 160.0,
+    dlat_deg: 1.0,
+    dlon_deg: 0.5,
+};
+
+/// Kelvin: 280 + month + row / 100 + col / 10,000; no data in column 7.
+fn value(month: usize, row: u32, col: u32) -> Option<f32> {
+    let value = 280.0 + month as f32 + row as f32 / 100.0 + col as f32 / 10_000.0;
+    (col != 7).then_some(value)
+}
+
+fn year() -> Vec<(Period, Vec<f32>)> {
+    let step = |(month, period): (usize, Period)| {
+        let cells = 0..GRID.cell_count() as u32;
+        let own = cells.map(|at| value(month, at / GRID.cols, at % GRID.cols).unwrap_or(f32::NAN));
+        (period, own.collect())
+    };
+    months(2010).into_iter().enumerate().map(step).collect()
+}
+
+async fn sst(store: &Store) {
+    let quantity = Quantity::SeaSurfaceTemperature;
+    land(store, &product("sst-test"), quantity, GRID, &year()).await;
+}
+
+const LIMITS: SqlLimits = SqlLimits {
+    memory_bytes: 256 << 20,
+    time: Duration::from_secs(120),
+};
+
+fn sql_of(engine: &Engine) -> Sql {
+    Sql::new(engine, LIMITS).unwrap()
+}
+
+async fn ask(sql: &Sql, text: &str) -> Result<RecordBatch, ComputeError> {
+    let mut rows = sql.ask(text).await?;
+    let mut batches = vec![];
+    while let Some(batch) = rows.next().await? {
+        batches.push(batch);
+    }
+    Ok(concat_batches(rows.schema(), &batches).unwrap())
+}
+
+/// Rows as texts.
+async fn texts(sql: &Sql, text: &str) -> Vec<Vec<String>> {
+    let batch = ask(sql, text)
+        .await
+        .unwrap_or_else(|e| panic!("{text}: {e}"));
+    let cell = |row, column: &datafusion::arrow::array::ArrayRef| {
+        array_value_to_string(column, row).unwrap()
+    };
+    (0..batch.num_rows())
+        .map(|row| {
+            batch
+                .columns()
+                .iter()
+                .map(|column| cell(row, column))
+                .collect()
+        })
+        .collect()
+}
+
+async fn one(sql: &Sql, text: &str) -> String {
+    let rows = texts(sql, text).await;
+    assert_eq!((rows.len(), rows[0].len()), (1, 1), "{text}: {rows:?}");
+    rows[0][0].clone()
+}
+
+/// The line of the plan that reads.
+async fn scan_of(sql: &Sql, text: &str) -> String {
+    let rows = texts(sql, &format!("EXPLAIN {text}")).await;
+    let plan = rows.iter().find(|row| row[0] == "physical_plan").unwrap();
+    let line = plan[1].lines().find(|line| line.contains("ProductScan"));
+    line.unwrap_or_else(|| panic!("{}", plan[1]))
+        .trim()
+        .to_owned()
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn every_cell_of_every_step_is_a_row_with_its_time_place_value_and_area() {
+    let (_folder, store) = folder_store();
+    sst(&store).await;
+    let sql = sql_of(&Engine::in_process(store, parts(2)));
+    let all = ask(&sql, "SELECT * FROM sst_test").await.unwrap();
+    assert_eq!(all.num_rows(), 12 * GRID.cell_count());
+    let instants = |at: usize| all.column(at).as_primitive::<TimestampMillisecondType>();
+    let numbers = |at: usize| all.column(at).as_primitive::<Float64Type>();
+    let values = all.column(4).as_primitive::<Float32Type>();
+    let mut seen = vec![false; 12 * GRID.cell_count()];
+    for at in 0..all.num_rows() {
+        let start = TimeMs::new(instants(0).value(at)).unwrap();
+        let month = start.year_month().1 as usize - 1;
+        assert_eq!(instants(1).value(at), months(2010)[month].end.ms());
+        let place = LonLatDeg::new(numbers(3).value(at), numbers(2).value(at)).unwrap();
+        let (row, col) = GRID.cell_at(place).unwrap();
+        let found = values.is_valid(at).then(|| values.value(at));
+        assert_eq!(found, value(month, row, col), "{month} {row} {col}");
+        let area_km2 = GRID.cell_area_m2(row, Earth::Wgs84) / 1e6;
+        assert_eq!(numbers(5).value(at).to_bits(), area_km2.to_bits());
+        let cell = month * GRID.cell_count() + (row * GRID.cols + col) as usize;
+        assert!(
+            !std::mem::replace(&mut seen[cell], true),
+            "twice: {month} {row} {col}"
+        );
+    }
+    // Units stand with the column.
+    let field = all.schema().field(4).clone();
+    assert_eq!(field.metadata()["units"], "K");
+    assert_eq!(field.metadata()["standard_name"], "sea_surface_temperature");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_filter_of_any_form_gives_the_rows_that_it_holds_for() {
+    let (_folder, store) = folder_store();
+    sst(&store).await;
+    let sql = sql_of(&Engine::in_process(store, parts(2)));
+    // What hides the columns from the table is worked out row by row.
+    let hidden = "(SELECT time_start, time_end, latitude, longitude, value, area_km2,
+                   row_number() OVER () AS n FROM sst_test)";
+    for filter in [
+        "time_start = '2010-03-01'",
+        "time_start >= '2010-11-01' AND latitude > 60",
+        "time_end <= TIMESTAMP '2010-02-01'",
+        "date_part('month', time_start) IN (12, 1) AND longitude < -170",
+        "latitude BETWEEN 10 AND 12 AND longitude IN (160.25, 179.75, -179.75)",
+        "longitude > 170 OR longitude < -100",
+        "area_km2 < 3000 AND value > 285",
+        "NOT (latitude < 64) AND time_start <> '2010-05-01'",
+        "latitude = 64.5 AND value IS NULL",
+        "latitude + longitude > 200",
+        "latitude > 70",
+        "time_start < time_end AND latitude = 64.5",
+        "CASE WHEN latitude > 0 THEN NULL ELSE latitude < -63 END",
+    ] {
+        let question = |from: &str| {
+            format!(
+                "SELECT count(*), count(value), min(value), max(value), min(longitude), max(latitude), sum(area_km2) FROM {from} WHERE {filter}"
+            )
+        };
+        let pushed = texts(&sql, &question("sst_test")).await;
+        let plain = texts(&sql, &question(hidden)).await;
+        assert_eq!(pushed[0][..6], plain[0][..6], "{filter}");
+    }
+    // And the comparison can fail.
+    let different = texts(&sql, "SELECT count(*) FROM sst_test WHERE latitude > 60").await;
+    assert_eq!(different, [[(5 * 150 * 12).to_string()]]);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn only_the_steps_and_chunks_that_are_asked_for_are_read_and_the_plan_says_so() {
+    let (_folder, store) = folder_store();
+    sst(&store).await;
+    let (root, inner) = store.sql_root();
+    let counting = Arc::new(Counting::of(inner));
+    let objects = Objects::new(root, Arc::clone(&counting) as Arc<dyn ObjectStore>);
+    let sql = sql_of(&Engine::in_process(store.clone(), parts(1)).reading(objects));
+    let one_chunk = "SELECT avg(value) FROM sst_test
+        WHERE time_start = '2010-03-01' AND latitude > 62 AND longitude BETWEEN 160 AND 161";
+    let plan = scan_of(&sql, one_chunk).await;
+    assert!(
+        plan.contains("steps=1 of 12, cells=6 of 19500, chunks=1 of 6, reads=fields, bytes=28800"),
+        "{plan}"
+    );
+    let plan = scan_of(&sql, "SELECT avg(value) FROM sst_test WHERE latitude > 62").await;
+    assert!(
+        plan.contains("steps=12 of 12, cells=450 of 19500, chunks=2 of 6"),
+        "{plan}"
+    );
+    let plan = scan_of(&sql, "SELECT DISTINCT time_start FROM sst_test").await;
+    assert!(plan.contains("reads=nothing, bytes=0"), "{plan}");
+    assert_eq!(counting.requests(), 0, "a plan reads no values");
+
+    let field_bytes = store
+        .size_bytes(&latest(&store).await.steps[0].field)
+        .await
+        .unwrap();
+    one(&sql, one_chunk).await;
+    let read = counting.bytes();
+    assert!(read > 0 && read < field_bytes, "{read} of {field_bytes}");
+    one(
+        &sql,
+        "SELECT count(value) FROM sst_test WHERE latitude > -100 AND value > 0",
+    )
+    .await;
+    let all = counting.bytes() - read;
+    assert!(
+        all > 11 * field_bytes && all < 17 * field_bytes,
+        "{all} of 12 x {field_bytes}"
+    );
+
+    // What is known without values reads none of them.
+    let before = counting.requests();
+    let count = (12 * GRID.cell_count()).to_string();
+    assert_eq!(one(&sql, "SELECT count(*) FROM sst_test").await, count);
+    let with_data = (12 * GRID.cell_count() - 12 * 130).to_string();
+    assert_eq!(
+        one(&sql, "SELECT count(value) FROM sst_test").await,
+        with_data
+    );
+    assert_eq!(
+        one(&sql, "SELECT max(time_end) FROM sst_test").await,
+        "2011-01-01T00:00:00Z"
+    );
+    texts(&sql, "SELECT DISTINCT latitude, area_km2 FROM sst_test").await;
+    assert_eq!(counting.requests(), before);
+
+    // A few rows do not read a product.
+    assert_eq!(texts(&sql, "SELECT * FROM sst_test LIMIT 3").await.len(), 3);
+    assert!(counting.bytes() - read - all < 2 * field_bytes);
+}
+
+async fn latest(store: &Store) -> contract::manifest::Manifest {
+    let found = storage::manifests::latest(store, &product("sst-test")).await;
+    found.unwrap().unwrap()
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn blocks_along_time_and_fields_give_the_same_rows() {
+    const SMALL: Grid = Grid {
+        rows: 70,
+        cols: 130,
+        north_deg: 41.0,
+        west_deg: 100.0,
+        dlat_deg: 0.5,
+        dlon_deg: 0.5,
+    };
+    let day = |day: i64| {
+        let at = |day: i64| TimeMs::new(day * 86_400_000).unwrap();
+        let period = Period::new(at(day), at(day + 1)).unwrap();
+        let value = |cell: usize| {
+            let is_gap = (cell * 7 + day as usize).is_multiple_of(11);
+            if is_gap {
+                f32::NAN
+            } else {
+                280.0 + cell as f32 / 1000.0 + day as f32 / 100.0
+            }
+        };
+        (period, (0..SMALL.cell_count()).map(value).collect())
+    };
+    let steps: Vec<(Period, Vec<f32>)> = (0..300).map(day).collect();
+    let (_folder, store) = folder_store();
+    let quantity = Quantity::SeaSurfaceTemperature;
+    let manifest = land(&store, &product("daily"), quantity, SMALL, &steps).await;
+    let questions = [
+        "SELECT * FROM daily WHERE latitude = 40.75 AND longitude = 100.25 ORDER BY time_start",
+        "SELECT * FROM daily WHERE latitude > 30 AND latitude < 36 AND longitude = 110.25
+            AND time_start BETWEEN '1970-02-03' AND '1970-09-20' ORDER BY 1, 3, 4",
+        "SELECT date_part('day', time_start) AS day, count(*), count(value), min(value), max(value) FROM daily
+            WHERE longitude > 164.5 AND latitude < 7 AND date_part('month', time_start) IN (1, 5, 6) GROUP BY 1 ORDER BY 1",
+    ];
+    let mut before = vec![];
+    let sql = sql_of(&Engine::in_process(store.clone(), parts(2)));
+    for question in questions {
+        assert!(scan_of(&sql, question).await.contains("reads=fields"));
+        before.push(texts(&sql, question).await);
+    }
+    assert_eq!(before[0].len(), 300);
+    cube::follow(&store, &manifest).await.unwrap();
+    assert!(cube::compact(&store, "cubes/daily").await.unwrap() >= 2);
+    let sql = sql_of(&Engine::in_process(store, parts(2)));
+    for (question, before) in questions.iter().zip(before) {
+        let plan = scan_of(&sql, question).await;
+        assert!(plan.contains("blocks"), "{plan}");
+        assert_eq!(texts(&sql, question).await, before, "{question}");
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn answers_are_the_same_bits_at_any_parallelism_in_the_order_of_rows_too() {
+    let (_folder, store) = folder_store();
+    let (id, flux) = (product("wavy"), Quantity::CarbonFlux);
+    land(&store, &id, flux, GRID, &wavy_year(&GRID)).await;
+    let question = "SELECT latitude, sum(value), avg(value), stddev(value), corr(value, longitude),
+        mean_weighted(value, area_km2), first_value(value) FROM wavy GROUP BY latitude";
+    let answer = async |partitions| {
+        let sql = sql_of(&Engine::in_process(store.clone(), parts(partitions)));
+        texts(&sql, question).await
+    };
+    let first = answer(1).await;
+    assert_eq!(first.len(), 130);
+    assert_eq!(answer(2).await, first);
+    assert_eq!(answer(7).await, first);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn whatever_would_write_or_read_elsewhere_is_refused_with_the_reason() {
+    let (folder, store) = folder_store();
+    sst(&store).await;
+    let outside = folder.path().join("outside.csv");
+    std::fs::write(&outside, "a,b\n1,2\n").unwrap();
+    let place = outside.to_str().unwrap();
+    let sql = sql_of(&Engine::in_process(store, parts(1)));
+    let files = format!("SELECT * FROM '{place}'");
+    let copied = format!("COPY (SELECT 1) TO '{place}.parquet'");
+    let external = format!("CREATE EXTERNAL TABLE t STORED AS CSV LOCATION '{place}'");
+    let read = format!("SELECT * FROM read_csv('{place}')");
+    for (text, reason) in [
+        (
+            "INSERT INTO sst_test VALUES (1)",
+            "INSERT is refused: SQL here reads only",
+        ),
+        ("UPDATE sst_test SET value = 1", "UPDATE is refused"),
+        ("DELETE FROM sst_test", "DELETE is refused"),
+        ("DROP TABLE sst_test", "DROP is refused"),
+        ("TRUNCATE sst_test", "TRUNCATE is refused"),
+        ("CREATE TABLE t AS SELECT 1", "CREATE is refused"),
+        ("CREATE VIEW t AS SELECT 1", "CREATE is refused"),
+        (
+            "CREATE FUNCTION f() RETURNS INT RETURN 1",
+            "CREATE is refused",
+        ),
+        ("SELECT * INTO t FROM sst_test", "reads only"),
+        (
+            "WITH t AS (SELECT 1) INSERT INTO sst_test SELECT * FROM t",
+            "INSERT is refused",
+        ),
+        (
+            "EXPLAIN ANALYZE INSERT INTO sst_test SELECT * FROM sst_test",
+            "INSERT is refused",
+        ),
+        (
+            "SET datafusion.execution.target_partitions = 9",
+            "SET is refused",
+        ),
+        (
+            "RESET datafusion.execution.target_partitions",
+            "RESET is refused",
+        ),
+        ("PREPARE p AS SELECT 1", "PREPARE is refused"),
+        ("BEGIN", "refused"),
+        (&copied, "COPY writes files: give --format and --output"),
+        (
+            &external,
+            "CREATE EXTERNAL TABLE reads files: land them with `fluxglobe ingest`",
+        ),
+        (&files, "not found; products are sst-test"),
+        (&read, "read_csv"),
+        ("SELECT 1; SELECT 2", "more than one statement"),
+        ("", "it is empty"),
+        ("-- nothing", "it is empty"),
+        (
+            "SELECT * FROM sst-test",
+            "a name with - in it is written with _",
+        ),
+        (
+            "SELECT * FROM atlantis",
+            "table 'fluxglobe.public.atlantis' not found; products are sst-test",
+        ),
+        ("SELECT * FROM \"sst-test@2\"", "not found"),
+        ("SELECT depth FROM sst_test", "depth"),
+        ("SELEC 1", "SELEC"),
+        ("SELECT repeat('x', 2000000000)", "repeat is left out"),
+        ("SELECT lpad('x', 2000000000)", "lpad is left out"),
+        ("SELECT range(0, 2000000000)", "range is left out"),
+        (
+            "SELECT mean_weighted(value, -1) FROM sst_test",
+            "is no weight",
+        ),
+        ("SELECT 1 / 0", "ivide by zero"),
+        ("SELECT * FROM stats('sst-test')", "stats takes texts"),
+        ("SELECT * FROM stats('sst-test', 'atlantis')", "atlantis"),
+        (
+            "SELECT * FROM stats('atlantis', 'global')",
+            "product \"atlantis\" is unknown",
+        ),
+    ] {
+        let error = ask(&sql, text).await.unwrap_err();
+        let told = error.to_string();
+        assert!(told.contains(reason), "{text}: {told}");
+        assert!(!error.is_retryable(), "{text}: {told}");
+    }
+    let long = format!("SELECT '{}'", "x".repeat(300 << 10));
+    let told = ask(&sql, &long).await.unwrap_err().to_string();
+    assert!(told.contains("are more than the"), "{told}");
+    let nested = format!("SELECT {}1{}", "(".repeat(5000), ")".repeat(5000));
+    let told = ask(&sql, &nested).await.unwrap_err().to_string();
+    assert!(told.contains("ecursion"), "{told}");
+    let there: Vec<_> = std::fs::read_dir(folder.path()).unwrap().collect();
+    assert!(!outside.with_extension("csv.parquet").exists(), "{there:?}");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_question_that_never_ends_is_ended_and_so_is_one_that_nobody_waits_for() {
+    let (_folder, store) = folder_store();
+    sst(&store).await;
+    let engine = Engine::in_process(store, parts(2));
+    let limits = SqlLimits {
+        time: Duration::from_millis(700),
+        ..LIMITS
+    };
+    let sql = Sql::new(&engine, limits).unwrap();
+    for endless in [
+        "WITH RECURSIVE t AS (SELECT 1 AS n UNION ALL SELECT n + 0 FROM t) SELECT count(*) FROM t",
+        "SELECT sum(a.value * b.value) FROM sst_test a, sst_test b, sst_test c",
+        "SELECT max(a.value) FROM generate_series(1, 100000000000) AS a(value)",
+    ] {
+        let begun = Instant::now();
+        let error = ask(&sql, endless).await.unwrap_err();
+        assert!(
+            matches!(error, ComputeError::QueryTime { .. }),
+            "{endless}: {error}"
+        );
+        assert!(
+            error.to_string().contains("after 0.7 s, its limit of time"),
+            "{error}"
+        );
+        assert!(
+            begun.elapsed() < Duration::from_secs(20),
+            "{endless}: {:?}",
+            begun.elapsed()
+        );
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_question_that_must_hold_more_than_its_memory_is_ended_and_a_stream_is_not() {
+    let (_folder, store) = folder_store();
+    sst(&store).await;
+    let engine = Engine::in_process(store, parts(2));
+    let limits = SqlLimits {
+        memory_bytes: 4 << 20,
+        ..LIMITS
+    };
+    let sql = Sql::new(&engine, limits).unwrap();
+    for large in [
+        "SELECT a.value, b.value FROM sst_test a, sst_test b WHERE a.time_start = '2010-01-01' AND b.latitude = 0.5 ORDER BY a.value + b.value",
+        "SELECT latitude, longitude, time_start, count(*) FROM sst_test GROUP BY 1, 2, 3",
+        "SELECT array_agg(a.value) FROM sst_test a, sst_test b",
+    ] {
+        let error = ask(&sql, large).await.unwrap_err();
+        assert!(
+            matches!(error, ComputeError::QueryMemory { limit_mib: 4 }),
+            "{large}: {error}"
+        );
+        assert!(!error.is_retryable());
+    }
+    // What streams needs no memory, however much it is; and with enough the same questions are answered.
+    assert_eq!(
+        ask(&sql, "SELECT * FROM sst_test")
+            .await
+            .unwrap()
+            .num_rows(),
+        12 * 19_500
+    );
+    let sql = sql_of(&engine);
+    let groups = "SELECT latitude, longitude, time_start, count(*) FROM sst_test GROUP BY 1, 2, 3";
+    assert_eq!(ask(&sql, groups).await.unwrap().num_rows(), 12 * 19_500);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_version_is_named_and_one_question_reads_one_version() {
+    let (_folder, store) = folder_store();
+    let (id, quantity) = (product("sst-test"), Quantity::SeaSurfaceTemperature);
+    land(&store, &id, quantity, GRID, &year()[..2]).await;
+    let second = land(&store, &id, quantity, GRID, &year()).await;
+    let sql = sql_of(&Engine::in_process(store, parts(1)));
+    let steps = async |name: &str| {
+        let text = format!("SELECT count(DISTINCT time_start) FROM {name}");
+        one(&sql, &text).await
+    };
+    assert_eq!(steps("\"sst-test\"").await, "12");
+    assert_eq!(steps("\"sst-test@1\"").await, "2");
+    assert_eq!(steps("\"sst_test@2\"").await, "12");
+    assert_eq!(steps(&format!("\"{}\"", second.id())).await, "12");
+    let wrong = ask(&sql, "SELECT 1 FROM \"sst-test@2-00000000\"").await;
+    assert!(wrong.unwrap_err().to_string().contains("not found"));
+    let listed = "SELECT name, version, quantity, unit, steps, first, last, rows, cols, west, east FROM products";
+    let row = "sst-test 2 sea_surface_temperature K 12 2010-01-01T00:00:00Z 2011-01-01T00:00:00Z 130 150 160.0 235.0";
+    let row: Vec<&str> = row.split(' ').collect();
+    assert_eq!(texts(&sql, listed).await, [row]);
+    let tables =
+        "SELECT table_name FROM information_schema.tables WHERE table_schema = 'public' ORDER BY 1";
+    assert_eq!(
+        texts(&sql, tables).await,
+        [["functions"], ["products"], ["sst-test"]]
+    );
+    let columns = texts(&sql, "DESCRIBE sst_test").await;
+    assert_eq!(columns.len(), 6);
+    assert_eq!(
+        texts(&sql, "SHOW TABLES")
+            .await
+            .iter()
+            .filter(|row| row[1] == "public")
+            .count(),
+        3
+    );
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn functions_of_the_field_are_those_of_expressions_and_statistics_those_of_the_reduction() {
+    let (_folder, store) = folder_store();
+    sst(&store).await;
+    let engine = Engine::in_process(store, parts(2));
+    let sql = sql_of(&engine);
+    let schmidt = one(&sql, "SELECT schmidt_wanninkhof2014(293.15)").await;
+    let schmidt: f64 = schmidt.parse().unwrap();
+    // Wanninkhof (2014), table 1: 668 for sea water at 20 °C.
+    assert!((schmidt - 668.0).abs() < 0.5, "{schmidt}");
+    let listed = "SELECT source FROM functions WHERE name = 'solubility_weiss1974'";
+    assert!(one(&sql, listed).await.contains("Weiss (1974)"));
+    // Of columns in single precision too.
+    let of_column = "SELECT count(solubility_weiss1974(value, 35)) FROM sst_test WHERE latitude = 0.5 AND time_start = '2010-01-01'";
+    assert_eq!(one(&sql, of_column).await, "149");
+
+    let region: contract::region::AskedRegion = "162,-10,170,10".parse().unwrap();
+    let query = StatisticsQuery {
+        step: "month".parse().unwrap(),
+        statistics: "mean,max".parse().unwrap(),
+        ..StatisticsQuery::new(product("sst-test"), AskedGeometry::from(region))
+    };
+    let answer = statistics(&engine, &query).await.unwrap();
+    let asked = "SELECT time_start, mean, max, unit FROM stats('sst_test', '162,-10,170,10', 'month', 'mean,max') ORDER BY 1";
+    let rows = texts(&sql, asked).await;
+    assert_eq!(rows.len(), 12);
+    for (row, own) in rows.iter().zip(&answer.rows) {
+        assert_eq!(row[0], own.start.to_string());
+        let numbers = ["mean", "max"].map(|name| own.values[name].unwrap().to_string());
+        assert_eq!(row[1..3], numbers);
+        assert_eq!(row[3], "°C");
+    }
+    // The mean by area of whole cells is that of the reduction, up to the digits that floats have.
+    let plain = "SELECT mean_weighted(value, area_km2) - 273.15 FROM sst_test
+        WHERE longitude BETWEEN 162 AND 170 AND latitude BETWEEN -10 AND 10 GROUP BY time_start ORDER BY time_start";
+    for (row, own) in texts(&sql, plain).await.iter().zip(&answer.rows) {
+        let (found, own): (f64, f64) = (row[0].parse().unwrap(), own.values["mean"].unwrap());
+        assert!((found - own).abs() < 1e-6, "{found} {own}");
+    }
+    for place in ["162.3,0.5", "162,0;170,5"] {
+        let asked = format!("SELECT count(mean) FROM stats('sst-test', '{place}')");
+        assert_eq!(one(&sql, &asked).await, "12", "{place}");
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_damaged_field_is_an_error_that_names_it_and_never_rows() {
+    let (_folder, store) = folder_store();
+    sst(&store).await;
+    let field = latest(&store).await.steps[2].field.clone();
+    let mut damaged = store.get(&field).await.unwrap().to_vec();
+    let middle = damaged.len() / 2;
+    damaged[middle] ^= 1;
+    store.put_over(&field, damaged.into()).await.unwrap();
+    let sql = sql_of(&Engine::in_process(store, parts(2)));
+    let error = ask(&sql, "SELECT sum(value) FROM sst_test")
+        .await
+        .unwrap_err();
+    assert!(error.to_string().contains(field.as_str()), "{error}");
+    let sound = "SELECT count(value) FROM sst_test WHERE value > 0 AND time_start > '2010-03-01'";
+    assert_eq!(one(&sql, sound).await, (9 * 130 * 149).to_string());
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn nothing_is_stored_by_a_question() {
+    let (_folder, store) = folder_store();
+    sst(&store).await;
+    let before = store.list("").await.unwrap();
+    let sql = sql_of(&Engine::in_process(store.clone(), parts(2)));
+    texts(&sql, "SELECT avg(value) FROM sst_test").await;
+    let polygon = "SELECT * FROM stats('sst-test', 'POLYGON((161 0,170 0,165 20,161 0))', 'year')";
+    assert_eq!(texts(&sql, polygon).await.len(), 1);
+    assert_eq!(store.list("").await.unwrap(), before);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn two_products_are_joined_by_time_and_place() {
+    let (_folder, store) = folder_store();
+    sst(&store).await;
+    land(
+        &store,
+        &product("wind"),
+        Quantity::WindSpeed,
+        GRID,
+        &year()[..3],
+    )
+    .await;
+    let sql = sql_of(&Engine::in_process(store, parts(2)));
+    let joined =
+        "SELECT count(*), count(a.value - b.value), max(abs(a.value - b.value)) FROM sst_test a
+        JOIN wind b USING (time_start, latitude, longitude)";
+    let expected = [
+        (3 * 19_500).to_string(),
+        (3 * 130 * 149).to_string(),
+        "0.0".to_owned(),
+    ];
+    assert_eq!(texts(&sql, joined).await, [expected]);
+    let count = ask(&sql, joined).await.unwrap();
+    assert_eq!(count.column(0).as_primitive::<Int64Type>().value(0), 58_500);
+}
