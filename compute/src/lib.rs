@@ -15,6 +15,7 @@ pub mod derive;
 mod error;
 pub mod expression;
 mod failure;
+pub mod flight_sql;
 pub mod functions;
 pub mod gc;
 pub mod matchup;

@@ -7,7 +7,9 @@
 mod about;
 mod axes;
 mod columns;
+mod limits;
 mod mean_weighted;
+mod named;
 mod product_table;
 mod reads;
 mod rows;
@@ -18,9 +20,11 @@ mod session;
 mod statement;
 mod statistics;
 mod tables;
+mod told;
 mod version;
 mod yielding;
 
+pub use limits::SqlLimits;
 pub use running::Rows;
+pub use session::Sql;
 pub(crate) use session::{CATALOG, SCHEMA};
-pub use session::{Sql, SqlLimits};

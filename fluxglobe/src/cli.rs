@@ -7,6 +7,7 @@ mod derive;
 mod derived;
 mod export;
 mod fill;
+mod flight_sql;
 mod ground;
 mod look;
 mod observations;
@@ -36,6 +37,7 @@ pub(crate) use derive::{Derive, DeriveCo2Flux, DeriveWhat, Expression, Regrid};
 pub(crate) use derived::DeriveStatistic;
 pub(crate) use export::{Export, ExportFormat, ExportedProduct};
 pub(crate) use fill::{BenchFill, FillError, ProductsOf};
+pub(crate) use flight_sql::FlightSql;
 pub(crate) use ground::{Ground, GroundOptions};
 pub(crate) use look::{Look, RenderLegend};
 pub(crate) use observations::{MatchTime, Matchup, Observations, ObservationsAsked};
@@ -148,6 +150,8 @@ pub(crate) enum Command {
     Stats(Stats),
     /// Ask products by SQL: a table a product, a row a cell and step; read only.
     Sql(SqlQuestion),
+    /// Answer SQL over the network, by Flight SQL: for ADBC, JDBC and pandas; read only.
+    FlightSql(FlightSql),
     /// Integrate a flux over a region and time (Tg C, positive out of the sea).
     Budget(Box<Budget>),
     /// Compute a product from others: by an expression, the flux of CO2, another grid, or accumulated.

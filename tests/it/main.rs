@@ -17,3 +17,4 @@ mod logged;
 mod reread;
 mod same_answers;
 mod sea;
+mod sql;

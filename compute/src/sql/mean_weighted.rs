@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use datafusion::arrow::array::{Array as _, ArrayRef, AsArray as _, Float64Array};
+use datafusion::arrow::array::{Array as _, ArrayRef, AsArray, Float64Array};
 use datafusion::arrow::datatypes::{DataType, Field, FieldRef, Float64Type};
 use datafusion::common::{Result, ScalarValue, exec_err};
 use datafusion::logical_expr::function::{AccumulatorArgs, StateFieldsArgs};
@@ -110,7 +110,7 @@ impl Accumulator for Sums {
     fn merge_batch(&mut self, states: &[ArrayRef]) -> Result<()> {
         let parts: Vec<&Float64Array> = states
             .iter()
-            .map(|part| part.as_primitive::<Float64Type>())
+            .map(AsArray::as_primitive::<Float64Type>)
             .collect();
         for row in 0..parts[0].len() {
             self.values.add(parts[0].value(row));

@@ -36,15 +36,11 @@ pub(super) fn axis_of(filter: &Expr) -> Option<Axis> {
     if is_asked_elsewhere.unwrap_or(true) || filter.is_volatile() {
         return None;
     }
-    let mut own = None;
-    for column in filter.column_refs() {
-        let axis = Axis::of(Column::named(&column.name)?)?;
-        if own.is_some_and(|own| own != axis) {
-            return None;
-        }
-        own = Some(axis);
-    }
-    own
+    let columns = filter.column_refs().into_iter();
+    let axes = columns.map(|column| Axis::of(Column::named(&column.name)?));
+    let axes: Vec<Axis> = axes.collect::<Option<_>>()?;
+    let own = *axes.first()?;
+    axes.iter().all(|axis| *axis == own).then_some(own)
 }
 
 impl Selection {

@@ -2,7 +2,6 @@
 
 use std::num::NonZeroUsize;
 use std::sync::Arc;
-use std::time::Duration;
 
 use datafusion::arrow::datatypes::{Schema, SchemaRef};
 use datafusion::catalog::{
@@ -20,12 +19,14 @@ use datafusion::physical_plan::execute_stream;
 use datafusion::prelude::SessionConfig;
 use tokio::time::{Instant, timeout_at};
 
+use super::limits::SqlLimits;
 use super::mean_weighted::MeanWeighted;
 use super::rows::BATCH_ROWS;
-use super::running::{Rows, Turn, overdue, told};
+use super::running::{Rows, Turn};
 use super::statement::{LARGE, statement};
 use super::statistics::{self, StatisticsFunction};
 use super::tables::Tables;
+use super::told::{overdue, told};
 use super::yielding::Yielding;
 use crate::expression::udf::number_functions;
 use crate::{ComputeError, Engine};
@@ -36,15 +37,6 @@ pub(crate) const CATALOG: &str = "fluxglobe";
 pub(crate) const SCHEMA: &str = "public";
 /// Consumers of memory that a log line names.
 const TOLD_CONSUMERS: NonZeroUsize = NonZeroUsize::new(3).expect("it is not 0");
-
-/// What one question may take.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SqlLimits {
-    /// For what it must hold: groups, sorted rows, a side of a join.
-    pub memory_bytes: usize,
-    /// From its text to its last row.
-    pub time: Duration,
-}
 
 /// Answers SQL over the products of an engine. Clones share it.
 #[derive(Clone)]
@@ -180,7 +172,7 @@ impl Sql {
         text: &str,
     ) -> Result<datafusion::dataframe::DataFrame, ComputeError> {
         let statement = statement(text)?;
-        let failed = |error| self.with_advice(told(error, Some(self.limits)), tables);
+        let failed = |error| Self::with_advice(told(error, Some(self.limits)), tables);
         let plan = context
             .state()
             .statement_to_plan(statement)
@@ -222,7 +214,7 @@ impl Sql {
     }
 
     /// An error with what to do about it, where that is known.
-    fn with_advice(&self, error: ComputeError, tables: &Tables) -> ComputeError {
+    fn with_advice(error: ComputeError, tables: &Tables) -> ComputeError {
         let ComputeError::Sql { reason } = error else {
             return error;
         };

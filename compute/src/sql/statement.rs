@@ -3,7 +3,7 @@
 use datafusion::sql::parser::{DFParserBuilder, Statement};
 use datafusion::sql::sqlparser::ast::{SetExpr, Statement as Ansi};
 
-use super::running::told;
+use super::told::told;
 use crate::ComputeError;
 
 /// Longest text of a question: nobody writes more by hand, and programs need not.

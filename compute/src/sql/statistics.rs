@@ -21,7 +21,7 @@ use datafusion::logical_expr::{Expr, TableType};
 use datafusion::physical_plan::ExecutionPlan;
 
 use super::columns::instant;
-use super::tables::Named;
+use super::named::Named;
 use super::version::external;
 use crate::reduce::statistics_of;
 use crate::{ComputeError, Engine};

@@ -23,6 +23,8 @@ mod damaged;
 #[cfg(test)]
 mod fixture;
 #[cfg(test)]
+mod flight_sql;
+#[cfg(test)]
 mod fluxengine;
 #[cfg(test)]
 mod frozen;

@@ -6,6 +6,7 @@ mod budget;
 pub(crate) mod derive;
 mod export;
 mod fill_error;
+mod flight_sql;
 mod gc;
 pub(crate) mod generate;
 mod ingest;
@@ -53,6 +54,7 @@ pub(crate) async fn run(settings: &Settings, command: Command) -> Result<ExitCod
         Command::Stats(Stats::Hovmoller(options)) => {
             analysis::hovmoller(settings, &options).await?;
         }
+        Command::FlightSql(options) => flight_sql::run(settings, &options).await?,
         Command::Sql(options) => sql::run(settings, &options).await?,
         Command::Budget(options) => budget::run(settings, &options).await?,
         Command::Derive(options) => {
