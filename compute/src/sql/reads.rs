@@ -73,7 +73,8 @@ impl Reads {
             let wanted = place(run.start)..place(run.end);
             let whole = run.start as u32..run.end as u32;
             let counts = (wanted.len(), reads.blocks.len(), reads.chunks.len());
-            if wanted.is_empty() || are_fields_less(&whole, counts.0, counts.1, counts.2) {
+            // Cells come one by one: no stored sums are read.
+            if wanted.is_empty() || are_fields_less(&whole, counts.0, [0, counts.1], counts.2) {
                 continue;
             }
             reads.fields(next..wanted.start);
@@ -95,7 +96,7 @@ impl Reads {
         let chunks = touched(selection, CHUNK_ROWS, CHUNK_COLS).count();
         let blocks = touched(selection, BLOCK_CELLS, BLOCK_CELLS).count();
         let steps = selection.steps.len();
-        steps >= LEAST_STEPS && !are_fields_less(&(0..RUN_STEPS as u32), steps, blocks, chunks)
+        steps >= LEAST_STEPS && !are_fields_less(&(0..RUN_STEPS as u32), steps, [0, blocks], chunks)
     }
 
     /// Chunks of a field that the selection touches, and all.

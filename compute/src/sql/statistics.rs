@@ -170,7 +170,7 @@ impl TableProvider for StatisticsTable {
                 known: known.map_err(external)?,
             }));
         };
-        let answer = statistics_of(&self.engine, &self.asked, &manifest).await;
+        let answer = statistics_of(&self.engine, &self.asked, &manifest, manifest.id()).await;
         let batch = rows(
             &answer.map_err(external)?,
             &self.asked.statistics,
