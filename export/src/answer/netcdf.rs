@@ -6,7 +6,7 @@
 use std::path::{Path, PathBuf};
 use std::str::FromStr as _;
 
-use arrow::array::{Array, ArrayRef, AsArray as _};
+use arrow::array::{Array as _, ArrayRef, AsArray as _};
 use arrow::compute::cast;
 use arrow::datatypes::{DataType, Field, Float32Type, Float64Type, Int64Type, SchemaRef, TimeUnit};
 use arrow::record_batch::RecordBatch;
@@ -203,9 +203,9 @@ fn begin(
     let mut datasets = vec![];
     for (field, kind) in columns.fields().iter().zip(kinds) {
         let dataset = match kind {
-            Kind::Float32 => filled(&file, field, f32::NAN)?,
-            Kind::Float64 => filled(&file, field, f64::NAN)?,
-            Kind::Whole | Kind::Instant(_) => filled(&file, field, FILL)?,
+            Kind::Float32 => filled(&file, field, &f32::NAN)?,
+            Kind::Float64 => filled(&file, field, &f64::NAN)?,
+            Kind::Whole | Kind::Instant(_) => filled(&file, field, &FILL)?,
             Kind::Text => growing::<VarLenUnicode>(&file, field.name())?,
         };
         describe(&dataset, field, *kind)?;
@@ -215,10 +215,10 @@ fn begin(
     Ok((file, rows, datasets))
 }
 
-fn filled<T: H5Type>(file: &File, field: &Field, fill: T) -> hdf5::Result<Dataset> {
+fn filled<T: H5Type>(file: &File, field: &Field, fill: &T) -> hdf5::Result<Dataset> {
     let dataset = growing::<T>(file, field.name())?;
     let attribute = dataset.new_attr::<T>().create("_FillValue")?;
-    attribute.write_scalar(&fill)?;
+    attribute.write_scalar(fill)?;
     Ok(dataset)
 }
 

@@ -62,7 +62,7 @@ pub(super) struct Json {
 }
 
 impl Json {
-    pub(super) fn new(sink: Sink, _columns: &SchemaRef) -> Self {
+    pub(super) fn new(sink: Sink) -> Self {
         let builder = WriterBuilder::new().with_explicit_nulls(true);
         Self {
             path: sink.path(),

@@ -78,8 +78,7 @@ fn text(options: &SqlQuestion) -> Result<String> {
 fn form(options: &SqlQuestion) -> Result<Option<AnswerFormat>> {
     let by_name = options.output.as_deref().map(SqlFormat::of_file);
     let form = match (options.format, by_name) {
-        (Some(form), _) => form,
-        (None, Some(Some(form))) => form,
+        (Some(form), _) | (None, Some(Some(form))) => form,
         (None, Some(None)) => bail!(
             "the ending of --output says no form: give .csv, .json, .arrow, .parquet or .nc, or --format"
         ),
