@@ -46,11 +46,12 @@ impl Cubes {
         number: u64,
     ) -> Result<Arc<Keys>, ServerError> {
         let name = format!("{product}@{number}");
-        let opening = async {
+        // To open a cube is a large future, and seldom: routes do not hold it in theirs.
+        let opening = Box::pin(async {
             let repository = Repository::open(&self.store, &cube::folder(product)).await?;
             let keys = repository.keys(&At::Version(number.to_string())).await;
             keys.map(Arc::new)
-        };
+        });
         match self.open.get_or_insert_async(&name, opening).await {
             Ok(keys) => Ok(keys),
             Err(CubeError::Missing { .. } | CubeError::NoVersion { .. }) => {

@@ -128,7 +128,7 @@ async fn rows(
     query: &StatisticsQuery,
 ) -> Result<Vec<StatisticsRow>, String> {
     let engine = Engine::in_process(store.clone(), parts(2));
-    let answer = statistics_of(&engine, query, manifest).await;
+    let answer = statistics_of(&engine, query, manifest, manifest.id()).await;
     answer.map(|own| own.rows).map_err(|e| e.to_string())
 }
 
