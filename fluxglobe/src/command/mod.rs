@@ -44,7 +44,9 @@ pub(crate) async fn run(settings: &Settings, command: Command) -> Result<ExitCod
         Command::Export(options) => export::run(settings, &options).await?,
         Command::Stats(Stats::Point(options)) => stats::point(settings, &options).await?,
         Command::Stats(Stats::Line(options)) => statistics::line(settings, &options).await?,
-        Command::Stats(Stats::Polygon(options)) => stats::polygon(settings, &options).await?,
+        Command::Stats(Stats::Polygon(options)) => {
+            Box::pin(stats::polygon(settings, &options)).await?;
+        }
         Command::Stats(Stats::Correlate(options)) => {
             analysis::correlate(settings, &options).await?;
         }
@@ -77,7 +79,7 @@ pub(crate) async fn run(settings: &Settings, command: Command) -> Result<ExitCod
         Command::Rejected(command) => rejected::run(settings, command).await?,
         Command::Observations(command) => observations::run(settings, command).await?,
         Command::Recompute(options) => {
-            recompute::run(settings, options).await?;
+            Box::pin(recompute::run(settings, options)).await?;
             cube::compacted().await;
         }
         Command::Survey(options) => survey::run(&options).await?,
