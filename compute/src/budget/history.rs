@@ -2,12 +2,12 @@
 
 use std::collections::BTreeMap;
 
-use contract::budget::{BudgetHistory, BudgetQuery, BudgetStep, VersionBudget};
+use contract::budget::{BudgetHistory, BudgetQuery, VersionBudget};
 use contract::grid::Grid;
 use contract::key::ObjectKey;
 use contract::manifest::Manifest;
 use contract::quantity::Quantity;
-use contract::time::{Period, TimeMs};
+use contract::time::{Period, TimeMs, TimeStep};
 use storage::manifests;
 
 use super::query::budget_of;
@@ -96,10 +96,10 @@ impl Reads {
 /// # Errors
 /// `UnknownProduct`; `Contract` for a question of several rows or more versions than are summed at once.
 pub async fn history(engine: &Engine, query: &BudgetQuery) -> Result<BudgetHistory, ComputeError> {
-    if query.step != BudgetStep::Total || query.parts.is_some() {
+    if query.step != TimeStep::Total || query.parts.is_some() {
         let reason = "a history is of one number: ask for the total of one region";
         return Err(
-            contract::ContractError::invalid("step", &query.step.to_string(), reason).into(),
+            contract::ContractError::invalid("step", query.step.as_str(), reason).into(),
         );
     }
     let published = manifests::published(engine.store(), &query.product).await?;

@@ -4,11 +4,11 @@ use std::time::{Duration, Instant};
 
 use compute::computed::{Request, compute};
 use compute::{Engine, budget, derive_accumulated};
-use contract::budget::{BudgetAnswer, BudgetQuery, BudgetStep};
+use contract::budget::{BudgetAnswer, BudgetQuery};
 use contract::manifest::{Manifest, Step};
 use contract::quantity::Quantity;
 use contract::region::{Polygon, Region};
-use contract::time::Period;
+use contract::time::{Period, TimeStep};
 use storage::Store;
 
 use crate::computed::{land_inputs, windy};
@@ -32,7 +32,7 @@ fn engine(store: &Store, cluster: &Cluster) -> Engine {
 
 fn monthly(region: &str) -> BudgetQuery {
     BudgetQuery {
-        step: BudgetStep::Month,
+        step: TimeStep::Month,
         ..total(&product("wavy"), region)
     }
 }
