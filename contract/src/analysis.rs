@@ -22,9 +22,7 @@ use utoipa::ToSchema;
 use crate::ContractError;
 use crate::cited::Cited;
 use crate::grid::LonLatDeg;
-use crate::manifest::{Manifest, ManifestId};
 use crate::product::ProductId;
-use crate::quantity::Quantity;
 use crate::series::{Cell, RegionSeriesQuery};
 use crate::time::{TimeMs, TimeStep};
 
@@ -37,10 +35,10 @@ pub use extremes::{Extreme, Extremes, Percentile};
 pub use hovmoller::{Along, Hovmoller, HovmollerBand, HovmollerQuery, HovmollerRow};
 pub use map::{MapOptions, MapStatistic};
 pub use season::{Harmonic, Season};
+pub use trend::{LeastSquaresTrend, MannKendall, TheilSenTrend, Trend, TrendValue};
 pub use wishes::{
     AnalysisWishes, CorrelationWishes, DifferenceWishes, HovmollerWishes, SeriesWishes,
 };
-pub use trend::{LeastSquaresTrend, MannKendall, TheilSenTrend, Trend, TrendValue};
 
 /// One thing that is made of a series.
 #[derive(

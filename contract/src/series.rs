@@ -7,9 +7,8 @@ use utoipa::ToSchema;
 
 use crate::cited::Cited;
 use crate::earth::Earth;
-use crate::manifest::{Manifest, ManifestId};
+use crate::manifest::Manifest;
 use crate::product::ProductId;
-use crate::quantity::Quantity;
 use crate::region::{AskedRegion, Region};
 use crate::time::TimeMs;
 

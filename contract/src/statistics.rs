@@ -14,9 +14,8 @@ use crate::ContractError;
 use crate::cited::Cited;
 use crate::earth::Earth;
 use crate::geometry::{AskedGeometry, Geometry};
-use crate::manifest::{Manifest, ManifestId};
+use crate::manifest::Manifest;
 use crate::product::ProductId;
-use crate::quantity::Quantity;
 use crate::region::Cells;
 use crate::time::{Period, TimeMs, TimeStep};
 

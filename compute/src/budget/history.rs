@@ -98,9 +98,7 @@ impl Reads {
 pub async fn history(engine: &Engine, query: &BudgetQuery) -> Result<BudgetHistory, ComputeError> {
     if query.step != TimeStep::Total || query.parts.is_some() {
         let reason = "a history is of one number: ask for the total of one region";
-        return Err(
-            contract::ContractError::invalid("step", query.step.as_str(), reason).into(),
-        );
+        return Err(contract::ContractError::invalid("step", query.step.as_str(), reason).into());
     }
     let published = manifests::published(engine.store(), &query.product).await?;
     if published.is_empty() {

@@ -55,7 +55,9 @@ async fn of_flux(
     let too_large =
         || ComputeError::inconsistent(manifest.id().to_string(), "its sums exceed 128 bits");
     let rows_of = |periods: &[Period]| rows(periods, &sums.steps, &asked).ok_or_else(too_large);
-    let periods = query.step.bins(window, steps.iter().map(|step| step.period))?;
+    let periods = query
+        .step
+        .bins(window, steps.iter().map(|step| step.period))?;
     let mut rows = rows_of(&periods)?;
     let closure = match query.step {
         TimeStep::Total => None,

@@ -96,7 +96,6 @@ fn answer(
     weighed: Weighed,
     rows: Vec<StatisticsRow>,
 ) -> StatisticsAnswer {
-    let unit = manifest.quantity.display().unit;
     let note = |statistic: Statistic| StatisticNote {
         name: statistic.to_string(),
         unit: unit_of(statistic, manifest.quantity, weighed.size_unit),

@@ -7,9 +7,7 @@ use async_trait::async_trait;
 use contract::geometry::AskedGeometry;
 use contract::grid::LonLatDeg;
 use contract::region::AskedRegion;
-use contract::statistics::{
-    Statistic, Statistics, StatisticsAnswer, StatisticsQuery,
-};
+use contract::statistics::{Statistic, Statistics, StatisticsAnswer, StatisticsQuery};
 use contract::time::TimeStep;
 use datafusion::arrow::array::{
     ArrayRef, Float64Array, RecordBatch, StringArray, TimestampMillisecondArray, UInt32Array,

@@ -2,7 +2,9 @@
 
 use compute::analysis::{self, analyse};
 use compute::{Engine, ErrorClass};
-use contract::analysis::{Along, AnalysisOptions, AnalysisPart, CorrelationQuery, HovmollerQuery, SeriesQuery};
+use contract::analysis::{
+    Along, AnalysisOptions, AnalysisPart, CorrelationQuery, HovmollerQuery, SeriesQuery,
+};
 use contract::earth::Earth;
 use contract::grid::{Grid, LonLatDeg};
 use contract::manifest::Manifest;

@@ -106,10 +106,7 @@ async fn statistics_of_a_polygon_are_those_of_plain_sums() {
     let seasons: [&[usize]; 5] = [&[0, 1], &[2, 3, 4], &[5, 6, 7], &[8, 9, 10], &[11]];
     for (step, bins) in [
         (TimeStep::Native, (0..12).map(|i| vec![i]).collect()),
-        (
-            TimeStep::Season,
-            seasons.map(<[usize]>::to_vec).to_vec(),
-        ),
+        (TimeStep::Season, seasons.map(<[usize]>::to_vec).to_vec()),
         (TimeStep::Total, vec![(0..12).collect::<Vec<_>>()]),
     ] {
         let query = asked(
@@ -320,11 +317,7 @@ async fn a_row_says_what_is_missing_and_too_little_is_withheld() {
             from: from.parse().ok(),
             to: to.parse().ok(),
             min_coverage: least.parse().unwrap(),
-            ..asked(
-                area(POLYGON),
-                "mean,min,count,coverage",
-                TimeStep::Month,
-            )
+            ..asked(area(POLYGON), "mean,min,count,coverage", TimeStep::Month)
         };
         statistics(&engine, &query).await.unwrap().rows
     };
@@ -367,11 +360,7 @@ async fn a_step_that_lies_across_two_rows_counts_in_both_by_its_time() {
         (period("2000-02-05", "2000-02-13"), constant(4e-9)),
     ];
     land(&store, &product("wavy"), Quantity::CarbonFlux, GRID, &steps).await;
-    let query = asked(
-        area("-40,-20,-10,10"),
-        "mean,min,max,std",
-        TimeStep::Month,
-    );
+    let query = asked(area("-40,-20,-10,10"), "mean,min,max,std", TimeStep::Month);
     let answer = statistics(&Engine::local(store), &query).await.unwrap();
     let factor = Quantity::CarbonFlux.display().factor;
     let of = |row: usize, name: &str| value(&answer, row, name) / factor / 1e-9;

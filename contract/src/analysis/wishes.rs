@@ -152,11 +152,7 @@ impl HovmollerWishes {
     ///
     /// # Errors
     /// A region that is no box.
-    pub fn query(
-        self,
-        product: ProductId,
-        along: Along,
-    ) -> Result<HovmollerQuery, ContractError> {
+    pub fn query(self, product: ProductId, along: Along) -> Result<HovmollerQuery, ContractError> {
         let bounds_deg = self.region.map(|region| region.as_box()).transpose()?;
         Ok(HovmollerQuery {
             product,
@@ -196,7 +192,10 @@ mod tests {
             wishes.query("sst".parse().unwrap())
         };
         assert!(matches!(of(place, None), Some(SeriesQuery::Cell { .. })));
-        assert!(matches!(of(None, region.clone()), Some(SeriesQuery::Region(_))));
+        assert!(matches!(
+            of(None, region.clone()),
+            Some(SeriesQuery::Region(_))
+        ));
         assert_eq!((of(place, region), of(None, None)), (None, None));
     }
 

@@ -118,7 +118,8 @@ mod tests {
             earth.clone().at_point(product(), place),
             PointQuestion::Series(place)
         );
-        let RegionQuestion::Series(series) = earth.over_region(product(), "global".parse().unwrap())
+        let RegionQuestion::Series(series) =
+            earth.over_region(product(), "global".parse().unwrap())
         else {
             panic!("statistics");
         };

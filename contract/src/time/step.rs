@@ -6,8 +6,8 @@ use std::str::FromStr;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use crate::ContractError;
 use super::{Period, TimeMs};
+use crate::ContractError;
 
 const DAY_MS: i64 = 86_400_000;
 /// Most rows of an answer: 270 years of days.
@@ -248,7 +248,13 @@ mod tests {
         assert_eq!(months, cut);
         let window = period("1999-12-31", "2001-01-01");
         let years = TimeStep::Year.bins(window, []).unwrap();
-        assert_eq!(years, [period("1999-12-31", "2000-01-01"), Period::year(2000).unwrap()]);
+        assert_eq!(
+            years,
+            [
+                period("1999-12-31", "2000-01-01"),
+                Period::year(2000).unwrap()
+            ]
+        );
     }
 
     #[test]

@@ -8,9 +8,7 @@ use std::sync::Arc;
 
 use anyhow::{Result, bail};
 use compute::region::{file, mask};
-use contract::budget::{
-    AsOf, BudgetAnswer, BudgetHistory, BudgetQuery, BudgetRow, BudgetWishes,
-};
+use contract::budget::{AsOf, BudgetAnswer, BudgetHistory, BudgetQuery, BudgetRow, BudgetWishes};
 use contract::manifest::Manifest;
 use contract::product::ProductId;
 use contract::quantity::Quantity;

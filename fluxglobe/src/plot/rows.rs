@@ -7,10 +7,6 @@ use plotters::prelude::{Color as _, LineSeries, PathElement};
 use super::chart::{Point, axis_of, band, chart, label, legend, lines, named, period};
 use super::page::{self, COLOURS, Words, range};
 
-#[expect(
-    clippy::too_many_lines,
-    reason = "one picture, drawn from top to bottom"
-)]
 pub(super) fn of_statistics(answer: &StatisticsAnswer) -> Result<String> {
     let cited = &answer.cited;
     let is_spread = |name: &str| name == Statistic::Std.to_string();

@@ -167,7 +167,11 @@ impl<'a> Known<'a> {
             manifest,
             notes,
             fields,
-            raw: list(Kind::Raw).await?.into_iter().filter_map(digest).collect(),
+            raw: list(Kind::Raw)
+                .await?
+                .into_iter()
+                .filter_map(digest)
+                .collect(),
         })
     }
 

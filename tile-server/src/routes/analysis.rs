@@ -4,9 +4,7 @@ use axum::Json;
 use axum::extract::State;
 use axum::http::header;
 use axum::response::{IntoResponse as _, Response};
-use contract::analysis::{
-    AnalysisPart, AnalysisWishes, SeriesAnalysis, SeriesQuery, SeriesWishes,
-};
+use contract::analysis::{AnalysisPart, AnalysisWishes, SeriesAnalysis, SeriesQuery, SeriesWishes};
 use contract::grid::LonLatDeg;
 use contract::time::TimeStep;
 use serde::Deserialize;
@@ -144,7 +142,9 @@ impl SeriesText<'_> {
         };
         // What cannot be asked waits for no turn.
         layer.manifest.steps_inside(wishes.from, wishes.to)?;
-        let query = wishes.query(layer.manifest.product.clone()).ok_or(missing)?;
+        let query = wishes
+            .query(layer.manifest.product.clone())
+            .ok_or(missing)?;
         if let SeriesQuery::Cell { place, .. } = &query {
             layer.manifest.cell_inside(*place)?;
         }

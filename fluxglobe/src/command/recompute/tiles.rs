@@ -53,7 +53,8 @@ pub(super) async fn plan(store: &Store, options: &Recompute) -> Result<Tiles> {
         northward: None,
         manifest: manifest.into(),
     };
-    let mut stored: BTreeSet<ObjectKey> = store.list(Kind::Tile.folder()).await?.into_iter().collect();
+    let mut stored: BTreeSet<ObjectKey> =
+        store.list(Kind::Tile.folder()).await?.into_iter().collect();
     if options.verify {
         let damaged = verify::damaged(store, stored.iter().cloned()).await?;
         stored.retain(|tile| !damaged.contains(tile));

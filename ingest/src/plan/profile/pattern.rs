@@ -51,7 +51,9 @@ impl PatternField {
 pub(crate) fn check(pattern: &str, knows_year: bool) -> Result<(), String> {
     let pieces = pieces(pattern)?;
     let has = |field| pieces.contains(&Piece::Number(field));
-    if (knows_year || has(PatternField::Year)) && (has(PatternField::Month) || has(PatternField::DayOfYear)) {
+    if (knows_year || has(PatternField::Year))
+        && (has(PatternField::Month) || has(PatternField::DayOfYear))
+    {
         Ok(())
     } else {
         Err(format!(
