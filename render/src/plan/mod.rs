@@ -60,8 +60,9 @@ static NEXT_ID: AtomicU64 = AtomicU64::new(1);
 const MOST_PARTICLES: u64 = 1 << 27;
 /// Largest part of a picture drawn at once, pixels a side; a multiple of the screen tile.
 const PART_PX: u32 = 2048;
-/// Shorter lists are not cut into parts: the parts of 1024 entries would be few.
-const LEAST_LONG_LIST: u32 = 1024;
+/// Shorter lists are not cut into parts: on an H100 a frame that is tilted by 60 degrees, 1.13 M particles in 128 slices, takes 0.63 ms
+/// with 1024 here, 0.56 with 512 and with 256, and one seen from above a pole 0.94, 0.95 and 1.35 ms.
+const LEAST_LONG_LIST: u32 = 512;
 /// A list is long that holds so many times the particles that all screen tiles would have if they had the same.
 const LONG_OVER_FAIR: u32 = 1;
 /// Largest share of its depth that a particle has at a place in its column.

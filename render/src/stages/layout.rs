@@ -19,10 +19,10 @@ pub const BEYOND_BIT: u32 = 0x8000;
 pub const RADIUS_BITS: u32 = 0x7fff;
 /// `ListParams::long_list`: no list is cut into parts.
 pub const NEVER_LONG: u32 = u32::MAX;
-/// Entries of a part of a long list.
-pub const PART_ENTRIES: u32 = 1024;
+/// Most entries of a part of a long list.
+pub const MOST_PART_ENTRIES: u32 = 1024;
 /// Most parts of a picture; lists that find no room are summed up whole.
-pub const MOST_HOT_PARTS: u32 = 4096;
+pub const MOST_HOT_PARTS: u32 = 8192;
 /// No list.
 pub const NO_LIST: u32 = u32::MAX;
 /// Counters that one workgroup of the scan sums up.

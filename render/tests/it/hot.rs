@@ -11,7 +11,7 @@ use render::plan::Plan;
 use render::playback::Playback;
 use render::stages::bin::{self, Bin};
 use render::stages::eye::{self, Eye};
-use render::stages::layout::{Entry, MOST_HOT_PARTS, NEVER_LONG, NO_LIST, PART_ENTRIES};
+use render::stages::layout::{Entry, MOST_HOT_PARTS, MOST_PART_ENTRIES, NEVER_LONG, NO_LIST};
 use render::stages::light::Light;
 use render::stages::sizes::list_count;
 use render::{Field, Interval, Scene};
@@ -20,7 +20,7 @@ use crate::device::{checked_gpu, gpu};
 use crate::scenes::{GRAM_A_YEAR, globe, job, tile};
 
 /// Pictures as small as these have no list that holds others up: here lists are long beforehand.
-const LONG: u32 = PART_ENTRIES;
+const LONG: u32 = MOST_PART_ENTRIES;
 
 /// Cells of a quarter of a degree all over the world: round a pole they crowd.
 const QUARTER_DEGREE: Grid = Grid {
@@ -129,7 +129,7 @@ fn a_list_in_parts_is_a_list_as_a_whole() {
         let sources = [bin::SOURCE, eye::SOURCE];
         let whole = draw(NEVER_LONG, sources, eye::SHARED);
         assert_eq!(whole.parts[0], 0);
-        assert!(whole.longest > 3 * PART_ENTRIES, "{}", whole.longest);
+        assert!(whole.longest > 3 * MOST_PART_ENTRIES, "{}", whole.longest);
         let cut = draw(LONG, sources, eye::SHARED);
         let taken = cut.parts[0] as usize;
         assert!(
@@ -140,7 +140,7 @@ fn a_list_in_parts_is_a_list_as_a_whole() {
         assert!(cut.pixels == whole.pixels, "{mode}");
         // Without room for parts, lists are summed up whole.
         let narrow = |source: &str| {
-            source.replace("MOST_HOT_PARTS: u32 = 4096u", "MOST_HOT_PARTS: u32 = 5u")
+            source.replace("MOST_HOT_PARTS: u32 = 8192u", "MOST_HOT_PARTS: u32 = 5u")
         };
         let [few, few_eye] = [narrow(bin::SOURCE), narrow(eye::SOURCE)];
         assert!(few != bin::SOURCE);
@@ -184,7 +184,7 @@ fn a_part_that_is_left_out_is_seen() {
         (1, "part < end; part++", "part + 1u < end; part++"),
         (
             1,
-            "(part + 1u - hot_lists[list]) * PART_ENTRIES",
+            "(part + 1u - hot_lists[list]) * part_entries()",
             "(part + 1u - hot_lists[list]) * 0u",
         ),
         (

@@ -11,9 +11,9 @@ use render::stages::isolines::params::Isoline;
 use render::stages::layout::{
     ASIDE, Axis, BEYOND_BIT, COVERED, Col, Entry, GROUP, GroundAxis, KERNEL_BALL, KERNEL_CLOUD,
     KERNEL_DOT, KERNEL_RIMMED, LEAST_COSINE_SQ, LEAST_SINE, LIGHT_ALONE, LIGHT_GIVEN, LIGHT_OFF,
-    LIGHT_OWN, LOOK, MISSING, MOST_EXPONENT, MOST_HOT_PARTS, MOST_POWER, NO_LIST, PART_ENTRIES,
-    Particle, RADIUS_BITS, Row, SCREEN_TILE_PX, SCREEN_TILE_SHIFT, SLOPE_ONE, SQUARE, SUBPIXELS,
-    Splat, VIEW_GLOBE, VIEW_TILE, Velocity, WATER_BLUE, WATER_GREEN, WATER_RED,
+    LIGHT_OWN, LOOK, MISSING, MOST_EXPONENT, MOST_HOT_PARTS, MOST_PART_ENTRIES, MOST_POWER,
+    NO_LIST, Particle, RADIUS_BITS, Row, SCREEN_TILE_PX, SCREEN_TILE_SHIFT, SLOPE_ONE, SQUARE,
+    SUBPIXELS, Splat, VIEW_GLOBE, VIEW_TILE, Velocity, WATER_BLUE, WATER_GREEN, WATER_RED,
 };
 use render::stages::params::{Fields, Params};
 use render::stages::{bin, compose, eye, flow, interpolate, isolines, light, map};
@@ -227,7 +227,7 @@ fn constants_have_the_same_value_in_rust_and_wgsl() {
         ("SUBPIXELS", f64::from(SUBPIXELS)),
         ("BEYOND_BIT", f64::from(BEYOND_BIT)),
         ("RADIUS_BITS", f64::from(RADIUS_BITS)),
-        ("PART_ENTRIES", f64::from(PART_ENTRIES)),
+        ("MOST_PART_ENTRIES", f64::from(MOST_PART_ENTRIES)),
         ("MOST_HOT_PARTS", f64::from(MOST_HOT_PARTS)),
         ("NO_LIST", f64::from(NO_LIST)),
         ("COVERED", f64::from(COVERED)),

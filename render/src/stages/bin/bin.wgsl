@@ -9,7 +9,7 @@ const PER_INVOCATION = 8u;
 
 // Finds room for the parts of a long list.
 fn cut(list: u32, length: u32) {
-    let parts = (length + PART_ENTRIES - 1u) / PART_ENTRIES;
+    let parts = (length + part_entries() - 1u) / part_entries();
     let first = atomicAdd(&hot_parts[0], parts);
     let fits = first + parts <= MOST_HOT_PARTS;
     for (var part = first; part < min(first + parts, MOST_HOT_PARTS); part++) {

@@ -22,7 +22,7 @@ fn long_sum(list: u32, length: u32, pixel: u32) -> LongSum {
     let first = hot_lists[list];
     if (first == 0u) { return LongSum(false, vec4(0u)); }
     var own = vec4(0u);
-    let end = first - 1u + (length + PART_ENTRIES - 1u) / PART_ENTRIES;
+    let end = first - 1u + (length + part_entries() - 1u) / part_entries();
     for (var part = first - 1u; part < end; part++) {
         let at = part * PART_SUMS + pixel;
         let more = vec4(hot_sums[at], hot_sums[at + PIXELS], hot_sums[at + 2u * PIXELS], hot_sums[at + 3u * PIXELS]);
@@ -46,8 +46,8 @@ fn hot(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(num_workgroups) wor
         workgroupBarrier();
         var begin = 0u;
         if (list > 0u) { begin = min(list_ends[list - 1u], lists.entry_capacity); }
-        begin += (part + 1u - hot_lists[list]) * PART_ENTRIES;
-        let end = min(begin + PART_ENTRIES, min(list_ends[list], lists.entry_capacity));
+        begin += (part + 1u - hot_lists[list]) * part_entries();
+        let end = min(begin + part_entries(), min(list_ends[list], lists.entry_capacity));
         var own = summed(begin, end, invocation);
         for (var channel = 0u; channel < 4u; channel++) { hot_sums[part * PART_SUMS + channel * PIXELS + invocation] = own[channel]; }
     }
