@@ -13,6 +13,7 @@ use datafusion::catalog::MemoryCatalogProviderList;
 use datafusion::error::DataFusionError;
 use datafusion::execution::context::SessionContext;
 use datafusion::execution::session_state::{SessionState, SessionStateBuilder};
+use futures::future::BoxFuture;
 use retry::Backoff;
 use storage::Store;
 use tokio::sync::OnceCell;
@@ -203,13 +204,15 @@ impl Engine {
     ///
     /// # Errors
     /// A store that does not answer; a cube that cannot be read.
-    pub async fn values(
-        &self,
-        manifest: &Manifest,
-        id: &ManifestId,
-    ) -> Result<cube::Values, ComputeError> {
-        let opened = self.open_versions.values(self.store(), manifest, id);
-        Ok(opened.await?)
+    pub fn values<'a>(
+        &'a self,
+        manifest: &'a Manifest,
+        id: &'a ManifestId,
+    ) -> BoxFuture<'a, Result<cube::Values, ComputeError>> {
+        Box::pin(async move {
+            let opened = self.open_versions.values(self.store(), manifest, id);
+            Ok(opened.await?)
+        })
     }
 
     /// Lets go of a version's values; false if they were not held.
@@ -233,16 +236,18 @@ impl Engine {
     }
 
     /// Starts the engine if it has not started; queries do so by themselves.
-    pub async fn start(&self) -> Result<(), ComputeError> {
-        self.session().await.map(|_session| ())
+    pub fn start(&self) -> BoxFuture<'_, Result<(), ComputeError>> {
+        Box::pin(async move { self.session().await.map(|_session| ()) })
     }
 
     /// Can a query be asked now? Of a cluster its scheduler is asked, within two seconds.
-    pub async fn ready(&self) -> Result<(), ComputeError> {
-        match &self.inner.kind {
-            Kind::Cluster(cluster) => cluster.scheduler.answers().await,
-            Kind::Standalone | Kind::Local => Ok(()),
-        }
+    pub fn ready(&self) -> BoxFuture<'_, Result<(), ComputeError>> {
+        Box::pin(async move {
+            match &self.inner.kind {
+                Kind::Cluster(cluster) => cluster.scheduler.answers().await,
+                Kind::Standalone | Kind::Local => Ok(()),
+            }
+        })
     }
 
     /// Works on a question; `job` is the hash of all that its answer depends on.
