@@ -1,7 +1,6 @@
 //! `/api/products/{product}/point`: the series of the cell at a place, in the unit people read; or
 //! statistics of it by bins of time.
 
-use axum::Json;
 use axum::extract::State;
 use axum::http::header;
 use axum::response::{IntoResponse as _, Response};
@@ -90,6 +89,10 @@ pub(crate) async fn get(
         let usual = StatisticsQuery::new(layer.manifest.product.clone(), point);
         return answer(&state, &layer, statistics.query(usual)?).await;
     }
-    let series = state.analyses.point(&layer, place).await?;
-    Ok(([(header::CACHE_CONTROL, "no-cache")], Json(series)).into_response())
+    let text = state.analyses.point(&layer, place).await?;
+    let headers = [
+        (header::CACHE_CONTROL, "no-cache"),
+        (header::CONTENT_TYPE, "application/json"),
+    ];
+    Ok((headers, text).into_response())
 }

@@ -219,6 +219,7 @@ pub(crate) struct Analyst {
     pub(crate) budgets: Mutex<Vec<BudgetQuery>>,
     /// Of each budget the number of the version that it is of.
     pub(crate) versions: Mutex<Vec<u64>>,
+    pub(crate) points: Mutex<Vec<LonLatDeg>>,
     pub(crate) areas: Mutex<Vec<RegionSeriesQuery>>,
     pub(crate) statistics: Mutex<Vec<StatisticsQuery>>,
     pub(crate) made: Mutex<Vec<SeriesQuestion>>,
@@ -244,6 +245,7 @@ impl Analyse for Analyst {
         id: &ManifestId,
         place: LonLatDeg,
     ) -> Result<PointSeries, BackendError> {
+        self.points.lock().unwrap().push(place);
         self.mood().apply()?;
         let (row, col) = manifest.cell_inside(place).unwrap();
         let is_sum = manifest.quantity == Quantity::AccumulatedCarbon;
