@@ -41,6 +41,8 @@ mod parallel;
 #[cfg(test)]
 mod places;
 #[cfg(test)]
+mod quarter_degree;
+#[cfg(test)]
 mod reading;
 #[cfg(test)]
 mod recomputed;
