@@ -16,6 +16,9 @@ use crate::{ComputeError, Objects, state};
 
 /// How long a question is asked again while the cluster is away.
 pub const RETRY_LIMIT: Duration = Duration::from_mins(2);
+/// How long a cluster may take for one query unless told otherwise: no executor has been there, none has room for it, or its
+/// scheduler hangs.
+pub const QUERY_LIMIT: Duration = Duration::from_hours(1);
 /// The port of a scheduler that is named without one.
 const DEFAULT_PORT: u16 = 50050;
 /// A scheduler that does not answer within this is not there.
@@ -100,6 +103,7 @@ impl std::str::FromStr for SchedulerUrl {
 pub(crate) struct Cluster {
     pub(crate) scheduler: SchedulerUrl,
     pub(crate) retry_limit: Duration,
+    pub(crate) query_limit: Duration,
 }
 
 impl Cluster {

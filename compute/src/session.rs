@@ -17,14 +17,12 @@ use futures::future::BoxFuture;
 use retry::Backoff;
 use storage::Store;
 use tokio::sync::OnceCell;
+use tokio::time::Instant;
 
 use crate::cluster::{self, Cluster, SchedulerUrl};
 use crate::open_versions::OpenVersions;
 use crate::standalone::{self, WorkFolder, WorkLease};
 use crate::{ComputeError, Objects, state};
-
-/// A query that a cluster does not answer within this is given up: no executor has been there, or none has room for it.
-const QUERY_LIMIT: Duration = Duration::from_hours(1);
 
 /// A query engine over one store; clones share it. It starts with its first query.
 #[derive(Clone)]
@@ -103,6 +101,7 @@ impl Engine {
         let cluster = Cluster {
             scheduler,
             retry_limit: cluster::RETRY_LIMIT,
+            query_limit: cluster::QUERY_LIMIT,
         };
         Self::new(store, Kind::Cluster(cluster), partitions)
     }
@@ -110,16 +109,25 @@ impl Engine {
     /// The same engine, waiting so long for a cluster that is away; other engines have nobody to wait for.
     #[must_use]
     pub fn with_retry_limit(&self, retry_limit: Duration) -> Self {
+        self.with_cluster(|cluster| cluster.retry_limit = retry_limit)
+    }
+
+    /// The same engine, giving a query up that its cluster does not answer within so long, tries to ask again among it;
+    /// other engines work themselves.
+    #[must_use]
+    pub fn with_query_limit(&self, query_limit: Duration) -> Self {
+        self.with_cluster(|cluster| cluster.query_limit = query_limit)
+    }
+
+    fn with_cluster(&self, change: impl FnOnce(&mut Cluster)) -> Self {
         let Kind::Cluster(cluster) = &self.inner.kind else {
             return self.clone();
         };
-        let kind = Kind::Cluster(Cluster {
-            retry_limit,
-            ..cluster.clone()
-        });
+        let mut cluster = cluster.clone();
+        change(&mut cluster);
         let inner = &self.inner;
         self.with(Inner {
-            kind,
+            kind: Kind::Cluster(cluster),
             session: OnceCell::new(),
             store: inner.store.clone(),
             objects: inner.objects.clone(),
@@ -263,14 +271,16 @@ impl Engine {
             return ask(self.context(&name).await?).await;
         };
         let mut pauses = Backoff::within(cluster.retry_limit).pauses();
+        let end = Instant::now() + cluster.query_limit;
         loop {
             let asked = ask(self.context(&name).await?);
-            let error = match tokio::time::timeout(QUERY_LIMIT, asked).await {
+            let error = match tokio::time::timeout_at(end, asked).await {
                 Ok(Err(error)) if error.is_retryable() => error,
                 Ok(ended) => return ended,
                 Err(_elapsed) => {
                     return Err(ComputeError::Overdue {
-                        limit_s: QUERY_LIMIT.as_secs(),
+                        scheduler: cluster.scheduler.to_string(),
+                        limit_s: cluster.query_limit.as_secs(),
                     });
                 }
             };

@@ -17,7 +17,7 @@ use storage::Store;
 
 use crate::computed::{land_inputs, windy};
 use crate::fixture::{ONE_DEGREE, ask, folder_store, land, parts, product, total, wavy_year};
-use crate::node::Cluster;
+use crate::node::{Cluster, LIMIT};
 use crate::statistics::{POLYGON, area, asked};
 
 /// Parts that queries are cut into, whatever the number of executors.
@@ -186,6 +186,30 @@ async fn a_scheduler_killed_in_the_middle_is_asked_again_when_it_is_back() {
         "scheduler lost: answered {:?} after the kill",
         killed.elapsed()
     );
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_cluster_that_never_answers_is_given_up_at_the_limit_with_the_reason() {
+    let (folder, store) = wavy_store().await;
+    let cluster = Cluster::start(folder.path());
+    let limit = Duration::from_secs(2);
+    let engine = engine(&store, &cluster).with_query_limit(limit);
+    // Nobody to work on it, and then a scheduler that hangs.
+    for is_frozen in [false, true] {
+        if is_frozen {
+            cluster.scheduler.freeze();
+        }
+        let begun = Instant::now();
+        let asked = tokio::time::timeout(LIMIT, budget(&engine, &monthly("global"))).await;
+        let error = asked.unwrap().unwrap_err();
+        assert!(begun.elapsed() >= limit);
+        assert!(error.is_retryable(), "{error}");
+        let reason = error.to_string();
+        let address = cluster.address.to_string();
+        for said in ["within 2 s", "--cluster-limit-s", address.as_str()] {
+            assert!(reason.contains(said), "{said}: {reason}");
+        }
+    }
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -240,6 +240,13 @@ impl Node {
         self.child.wait().unwrap();
     }
 
+    /// Stops it in its tracks: it holds its port and answers nobody.
+    pub(crate) fn freeze(&self) {
+        let id = self.child.id().to_string();
+        let stopped = Command::new("kill").args(["-STOP", &id]).status();
+        assert!(stopped.unwrap().success());
+    }
+
     /// Asks it to end and waits until it has.
     pub(crate) fn stop(&mut self) {
         use std::io::Write as _;
