@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use ballista::extension::SessionStateExt as _;
+use ballista_core::serde::protobuf::CancelJobParams;
 use ballista_core::serde::protobuf::scheduler_grpc_client::SchedulerGrpcClient;
 use ballista_core::utils::{GrpcClientConfig, create_grpc_client_endpoint};
 use datafusion::error::DataFusionError;
@@ -41,13 +42,30 @@ impl SchedulerUrl {
             .map_err(|e| ComputeError::cluster("reaching the scheduler")(e.into()))
     }
 
-    /// Does a scheduler answer there?
-    pub(crate) async fn answers(&self) -> Result<(), ComputeError> {
+    async fn connect(
+        &self,
+    ) -> Result<SchedulerGrpcClient<tonic::transport::Channel>, ComputeError> {
         let connected = self.endpoint()?.connect().await;
         let lost =
             |e: tonic::transport::Error| ComputeError::cluster("reaching the scheduler")(e.into());
-        drop(SchedulerGrpcClient::new(connected.map_err(lost)?));
-        Ok(())
+        Ok(SchedulerGrpcClient::new(connected.map_err(lost)?))
+    }
+
+    /// Does a scheduler answer there?
+    pub(crate) async fn answers(&self) -> Result<(), ComputeError> {
+        self.connect().await.map(drop)
+    }
+
+    /// Has the scheduler give out no more tasks of a job.
+    pub(crate) async fn cancel(&self, job: &str) -> Result<(), ComputeError> {
+        let job_id = job.to_owned();
+        let asked = self
+            .connect()
+            .await?
+            .cancel_job(CancelJobParams { job_id })
+            .await;
+        let failed = |e: tonic::Status| ComputeError::cluster("cancelling a query")(e.into());
+        asked.map(drop).map_err(failed)
     }
 }
 
