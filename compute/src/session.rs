@@ -275,6 +275,11 @@ impl Engine {
         !matches!(self.inner.kind, Kind::Local)
     }
 
+    /// Does whoever plans its queries deal the pieces of a question out to executors?
+    pub(crate) fn has_dealer(&self) -> bool {
+        matches!(self.inner.kind, Kind::Cluster(_))
+    }
+
     /// Starts the engine if it has not started; queries do so by themselves.
     pub fn start(&self) -> BoxFuture<'_, Result<(), ComputeError>> {
         Box::pin(async move { self.session().await.map(|_session| ()) })

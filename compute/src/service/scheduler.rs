@@ -22,6 +22,7 @@ use tokio::net::TcpListener;
 use tokio::time::Instant;
 
 use super::background::Background;
+use super::dealing::Dealing;
 use super::room::Room;
 use super::scheduler_metrics::QueryMetrics;
 use super::scheduler_watch::Seen;
@@ -186,8 +187,11 @@ fn config(
     let runtime = state::runtime(objects, state::MEMORY_BYTES)
         .map_err(ComputeError::engine("starting the scheduler"))?;
     let objects = objects.clone();
-    let sessions =
-        move |config| state::session_state(room.fill(config), Arc::clone(&runtime), &objects);
+    let sessions = move |config| {
+        let mut own = state::session_state(room.fill(config), Arc::clone(&runtime), &objects)?;
+        own.add_analyzer_rule(Arc::new(Dealing));
+        Ok(own)
+    };
     Ok(SchedulerConfig {
         scheduler_id: new_instance_id(),
         bind_host: address.ip().to_string(),
