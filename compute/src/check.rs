@@ -1,10 +1,11 @@
 //! Our budgets beside the published ones: what a demonstration prints and what it is held to.
 
-use contract::budget::{BudgetQuery, BudgetRow, BudgetStep};
+use contract::budget::{BudgetQuery, BudgetRow};
 use contract::check::{AgainstPaper, CheckRow, Stated, Verdict};
 use contract::earth::Earth;
 use contract::product::ProductId;
 use contract::region::{Cells, NamedRegion};
+use contract::time::TimeStep;
 use futures::future::BoxFuture;
 use futures::future::{try_join, try_join_all};
 
@@ -67,7 +68,7 @@ async fn annual_row(
     product: &ProductId,
     entry: &Annual,
 ) -> Result<CheckRow, ComputeError> {
-    let query = query(product, entry.region, BudgetStep::Total, entry.earth)?;
+    let query = query(product, entry.region, TimeStep::Total, entry.earth)?;
     let answer = budget(engine, &query).await?;
     let [row] = &answer.rows[..] else {
         return Err(unlike_the_published(product, "no single total"));
@@ -94,7 +95,7 @@ async fn annual_row(
 async fn monthly_rows(engine: &Engine, product: &ProductId) -> Result<Vec<CheckRow>, ComputeError> {
     let answer = budget(
         engine,
-        &query(product, "global", BudgetStep::Month, Earth::Wgs84)?,
+        &query(product, "global", TimeStep::Month, Earth::Wgs84)?,
     )
     .await?;
     if answer.rows.len() != MONTHS.len() {
@@ -124,7 +125,7 @@ async fn monthly_rows(engine: &Engine, product: &ProductId) -> Result<Vec<CheckR
 fn query(
     product: &ProductId,
     name: &str,
-    step: BudgetStep,
+    step: TimeStep,
     earth: Earth,
 ) -> Result<BudgetQuery, ComputeError> {
     Ok(BudgetQuery {

@@ -1,5 +1,6 @@
 //! The series of a product at one place.
 
+use contract::cited::Cited;
 use contract::grid::{LonLatDeg, rounded_deg};
 use contract::manifest::{Manifest, ManifestId};
 use contract::product::ProductId;
@@ -44,13 +45,7 @@ pub fn point_series_of<'a>(
         };
         let center = manifest.grid.cell_center(row, col);
         Ok(PointSeries {
-            product: manifest.product.clone(),
-            manifest: id,
-            title: manifest.title.clone(),
-            source: manifest.source.clone(),
-            synthetic: manifest.synthetic,
-            quantity: manifest.quantity,
-            unit: display.unit.to_owned(),
+            cited: Cited::of(manifest, id),
             lon_deg: rounded_deg(place.lon),
             lat_deg: rounded_deg(place.lat),
             cell: Cell {

@@ -10,8 +10,8 @@ mod extremes;
 mod hovmoller;
 mod map;
 mod season;
-mod steps;
 mod trend;
+mod wishes;
 
 use std::fmt::{Display, Formatter};
 use std::str::FromStr;
@@ -20,12 +20,11 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::ContractError;
+use crate::cited::Cited;
 use crate::grid::LonLatDeg;
-use crate::manifest::{Manifest, ManifestId};
 use crate::product::ProductId;
-use crate::quantity::Quantity;
 use crate::series::{Cell, RegionSeriesQuery};
-use crate::time::TimeMs;
+use crate::time::{TimeMs, TimeStep};
 
 pub use base::BasePeriod;
 pub use bins::CalendarBins;
@@ -36,43 +35,10 @@ pub use extremes::{Extreme, Extremes, Percentile};
 pub use hovmoller::{Along, Hovmoller, HovmollerBand, HovmollerQuery, HovmollerRow};
 pub use map::{MapOptions, MapStatistic};
 pub use season::{Harmonic, Season};
-pub use steps::MeanStep;
 pub use trend::{LeastSquaresTrend, MannKendall, TheilSenTrend, Trend, TrendValue};
-
-/// What an answer is to be cited with.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
-pub struct Cited {
-    /// Product.
-    pub product: ProductId,
-    /// The version of the product that was read.
-    #[schema(value_type = String)]
-    pub manifest: ManifestId,
-    /// Title of the product.
-    pub title: String,
-    /// Citation of the product.
-    pub source: String,
-    /// Made up by a program rather than measured.
-    pub synthetic: bool,
-    /// What the values are.
-    pub quantity: Quantity,
-    /// Unit of the values, the one that people read.
-    pub unit: String,
-}
-
-impl Cited {
-    /// That of a version of a product; `id` is its name, which is costly to compute.
-    pub fn of(manifest: &Manifest, id: ManifestId) -> Self {
-        Self {
-            product: manifest.product.clone(),
-            manifest: id,
-            title: manifest.title.clone(),
-            source: manifest.source.clone(),
-            synthetic: manifest.synthetic,
-            quantity: manifest.quantity,
-            unit: manifest.quantity.display().unit.to_owned(),
-        }
-    }
-}
+pub use wishes::{
+    AnalysisWishes, CorrelationWishes, DifferenceWishes, HovmollerWishes, SeriesWishes,
+};
 
 /// One thing that is made of a series.
 #[derive(
@@ -142,10 +108,13 @@ pub struct AnalysisOptions {
     /// Parts of the year.
     pub bins: CalendarBins,
     /// Means that a trend is drawn through.
-    pub trend_step: MeanStep,
+    pub trend_step: TimeStep,
 }
 
 impl AnalysisOptions {
+    /// Means that trends, correlations and Hovmöller diagrams are made of where nothing is said.
+    pub const USUAL_STEP: TimeStep = TimeStep::Month;
+
     /// Some parts with the usual options.
     ///
     /// # Errors
@@ -161,7 +130,7 @@ impl AnalysisOptions {
             parts,
             base: None,
             bins: CalendarBins::default(),
-            trend_step: MeanStep::default(),
+            trend_step: Self::USUAL_STEP,
         })
     }
 }

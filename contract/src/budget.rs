@@ -5,6 +5,7 @@ mod closure;
 mod history;
 mod river;
 mod uncertainty;
+mod wishes;
 
 use std::sync::Arc;
 
@@ -17,7 +18,7 @@ use crate::manifest::{Manifest, ManifestId, Step};
 use crate::product::ProductId;
 use crate::quantity::Quantity;
 use crate::region::{AskedRegion, Cells, Region};
-use crate::time::{Period, TimeMs};
+use crate::time::{Period, TimeMs, TimeStep};
 
 pub use besides::{Besides, BudgetWords};
 pub use closure::{Closure, RegionBudget, RegionsClosure};
@@ -26,40 +27,7 @@ pub use river::{AskedRiver, RiverFlux, RowRiver, StatedRiver};
 pub use uncertainty::{
     BudgetErrors, BudgetUncertainty, ErrorWords, MonteCarlo, RowDraws, RowUncertainty, StatedError,
 };
-
-/// What one row of a budget covers.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash, Serialize, Deserialize, ToSchema)]
-#[serde(rename_all = "lowercase")]
-pub enum BudgetStep {
-    /// Calendar months.
-    Month,
-    /// Calendar years.
-    Year,
-    /// The whole asked period.
-    #[default]
-    Total,
-}
-
-impl std::fmt::Display for BudgetStep {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(match self {
-            Self::Month => "month",
-            Self::Year => "year",
-            Self::Total => "total",
-        })
-    }
-}
-
-impl std::str::FromStr for BudgetStep {
-    type Err = ContractError;
-
-    fn from_str(s: &str) -> Result<Self, Self::Err> {
-        [Self::Month, Self::Year, Self::Total]
-            .into_iter()
-            .find(|step| step.to_string() == s)
-            .ok_or_else(|| ContractError::invalid("step", s, "use month, year or total"))
-    }
-}
+pub use wishes::BudgetWishes;
 
 /// What a budget is asked for.
 #[derive(Debug, Clone, PartialEq)]
@@ -75,7 +43,7 @@ pub struct BudgetQuery {
     /// First instant after the asked period; the product's end if absent.
     pub to: Option<TimeMs>,
     /// What a row covers.
-    pub step: BudgetStep,
+    pub step: TimeStep,
     /// Figure of the earth.
     pub earth: Earth,
     /// How cells on the coast count.
@@ -91,6 +59,9 @@ pub struct BudgetQuery {
 }
 
 impl BudgetQuery {
+    /// What a row covers where nothing is said.
+    pub const USUAL_STEP: TimeStep = TimeStep::Total;
+
     /// The usual question about a region: one row of all there is.
     pub fn new(product: ProductId, asked: AskedRegion) -> Self {
         Self {
@@ -99,7 +70,7 @@ impl BudgetQuery {
             region_name: asked.name,
             from: None,
             to: None,
-            step: BudgetStep::default(),
+            step: Self::USUAL_STEP,
             earth: Earth::default(),
             cells: Cells::default(),
             ocean: None,

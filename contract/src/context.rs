@@ -8,6 +8,7 @@ use crate::base_map::{Background, BaseMap};
 use crate::grid::Grid;
 use crate::isolines::Isolines;
 use crate::key::ObjectKey;
+use crate::kind::Kind;
 use crate::manifest::Manifest;
 use crate::quantity::Quantity;
 
@@ -172,7 +173,7 @@ impl Relief {
             let reason = format!("it has {cells} cells, at most {MAX_RELIEF_CELLS} are drawn");
             return bad(self.field.as_str(), reason);
         }
-        if !self.field.is_in("frames") {
+        if !self.field.is_in(Kind::Field.folder()) {
             return bad(self.field.as_str(), "a field is wanted".to_owned());
         }
         if !(0.0..=MAX_RELIEF_EXAGGERATION).contains(&self.exaggeration) {

@@ -82,7 +82,7 @@ impl Kind {
     ];
 
     /// The top-level folder of such objects, and their name in metrics.
-    pub fn folder(self) -> &'static str {
+    pub const fn folder(self) -> &'static str {
         match self {
             Self::Raw => "raw",
             Self::Field => "frames",

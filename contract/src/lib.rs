@@ -11,6 +11,7 @@ pub mod budget;
 pub mod camera;
 pub mod check;
 pub mod chunk;
+pub mod cited;
 pub mod colour;
 pub mod computed;
 pub mod context;

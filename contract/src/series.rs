@@ -5,31 +5,19 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use crate::cited::Cited;
 use crate::earth::Earth;
-use crate::manifest::{Manifest, ManifestId};
+use crate::manifest::Manifest;
 use crate::product::ProductId;
-use crate::quantity::Quantity;
 use crate::region::{AskedRegion, Region};
 use crate::time::TimeMs;
 
 /// The series of a cell, with all that is needed to cite it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct PointSeries {
-    /// Product.
-    pub product: ProductId,
-    /// The version of the product that was read.
-    #[schema(value_type = String)]
-    pub manifest: ManifestId,
-    /// Title of the product.
-    pub title: String,
-    /// Citation of the product.
-    pub source: String,
-    /// Made up by a program rather than measured.
-    pub synthetic: bool,
-    /// What the values are.
-    pub quantity: Quantity,
-    /// Unit of the values, the one that people read.
-    pub unit: String,
+    /// What it is to be cited with.
+    #[serde(flatten)]
+    pub cited: Cited,
     /// Asked longitude, degrees, in [-180, 180).
     pub lon_deg: f64,
     /// Asked latitude, degrees.
@@ -119,21 +107,9 @@ impl RegionSeriesQuery {
 /// The mean of a product over a region, step by step, with all that is needed to cite it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct RegionSeries {
-    /// Product.
-    pub product: ProductId,
-    /// The version of the product that was read.
-    #[schema(value_type = String)]
-    pub manifest: ManifestId,
-    /// Title of the product.
-    pub title: String,
-    /// Citation of the product.
-    pub source: String,
-    /// Made up by a program rather than measured.
-    pub synthetic: bool,
-    /// What the values are.
-    pub quantity: Quantity,
-    /// Unit of the means, the one that people read.
-    pub unit: String,
+    /// What it is to be cited with.
+    #[serde(flatten)]
+    pub cited: Cited,
     /// The region by its name, or as `west,south,east,north`.
     pub region: String,
     /// Area of the region, land included, m².

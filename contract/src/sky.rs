@@ -10,7 +10,7 @@ const HALVINGS: u32 = 40;
 const TOLD_PARTS: f64 = 10.0;
 
 /// Edges of a picture as a camera has them before it: forward, right and top.
-struct Frame {
+struct PictureEdges {
     corners: [[f64; 3]; 4],
     half: [f64; 2],
 }
@@ -26,7 +26,7 @@ impl View {
         else {
             return None;
         };
-        let frame = Frame::of(&angles, self.size_px());
+        let frame = PictureEdges::of(&angles, self.size_px());
         if height_m < 0.0 || frame.has_ground(&angles, height_m) {
             return None;
         }
@@ -45,7 +45,7 @@ impl View {
     }
 }
 
-impl Frame {
+impl PictureEdges {
     fn of(angles: &CameraAngles, size_px: [u32; 2]) -> Self {
         let [width, height] = size_px.map(f64::from);
         let half_side = (angles.field_of_view_deg / 2.0).to_radians().tan();
@@ -135,7 +135,7 @@ mod tests {
         else {
             panic!("a globe")
         };
-        let frame = Frame::of(&angles, view.size_px());
+        let frame = PictureEdges::of(&angles, view.size_px());
         let (sin_tilt, cos_tilt) = angles.tilt_deg.to_radians().sin_cos();
         let (sin_roll, cos_roll) = angles.roll_deg.to_radians().sin_cos();
         let down = [cos_tilt, sin_tilt * sin_roll, -sin_tilt * cos_roll];

@@ -1,8 +1,8 @@
 //! Statistics of a product over a geometry, by bins of time: as they are asked for and answered, the same on the command
 //! line and over HTTP.
 
-mod bins;
 mod statistic;
+mod wishes;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -11,16 +11,16 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::ContractError;
+use crate::cited::Cited;
 use crate::earth::Earth;
 use crate::geometry::{AskedGeometry, Geometry};
-use crate::manifest::{Manifest, ManifestId};
+use crate::manifest::Manifest;
 use crate::product::ProductId;
-use crate::quantity::Quantity;
 use crate::region::Cells;
-use crate::time::{Period, TimeMs};
+use crate::time::{Period, TimeMs, TimeStep};
 
-pub use bins::{MAX_BINS, StatisticsStep};
 pub use statistic::{Percentile, Statistic, Statistics};
+pub use wishes::{PointQuestion, RegionQuestion, StatisticsWishes};
 
 /// What statistics are asked for.
 #[derive(Debug, Clone, PartialEq)]
@@ -34,7 +34,7 @@ pub struct StatisticsQuery {
     /// Which, in the order of the answer, each once.
     pub statistics: Statistics,
     /// What a row covers.
-    pub step: StatisticsStep,
+    pub step: TimeStep,
     /// First instant; the product's first if absent.
     pub from: Option<TimeMs>,
     /// First instant after the asked period; the product's end if absent.
@@ -50,6 +50,9 @@ pub struct StatisticsQuery {
 }
 
 impl StatisticsQuery {
+    /// What a row covers where nothing is said.
+    pub const USUAL_STEP: TimeStep = TimeStep::Native;
+
     /// The usual question about a geometry: the mean at every step.
     pub fn new(product: ProductId, asked: AskedGeometry) -> Self {
         Self {
@@ -57,7 +60,7 @@ impl StatisticsQuery {
             geometry: asked.geometry,
             geometry_name: asked.name,
             statistics: Statistics::default(),
-            step: StatisticsStep::default(),
+            step: Self::USUAL_STEP,
             from: None,
             to: None,
             earth: Earth::default(),
@@ -106,27 +109,15 @@ impl std::str::FromStr for MinCoverage {
 /// Statistics of a product over a geometry, with all that is needed to cite them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct StatisticsAnswer {
-    /// Product.
-    pub product: ProductId,
-    /// The version of the product that was read.
-    #[schema(value_type = String)]
-    pub manifest: ManifestId,
-    /// Title of the product.
-    pub title: String,
-    /// Citation of the product.
-    pub source: String,
-    /// Made up by a program rather than measured.
-    pub synthetic: bool,
-    /// What the values are.
-    pub quantity: Quantity,
-    /// Unit of the product's values, the one that people read.
-    pub unit: String,
+    /// What it is to be cited with.
+    #[serde(flatten)]
+    pub cited: Cited,
     /// `point`, `line` or `area`.
     pub kind: String,
     /// The geometry by its name, or as it was asked for.
     pub geometry: String,
     /// What a row covers.
-    pub step: StatisticsStep,
+    pub step: TimeStep,
     /// Figure of the earth.
     pub earth: Earth,
     /// How cells on the coast counted.

@@ -1,5 +1,6 @@
 //! Instants and the periods that product steps cover: UTC, milliseconds, ISO 8601 at the edge.
 
+mod step;
 mod text;
 mod words;
 
@@ -11,6 +12,8 @@ use serde::{Deserialize, Serialize, Serializer};
 use utoipa::ToSchema;
 
 use crate::ContractError;
+
+pub use step::TimeStep;
 use text::IsoText;
 
 /// An instant, milliseconds since 1970-01-01T00:00:00Z; shown and parsed as ISO 8601.

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::ContractError;
 use crate::key::ObjectKey;
+use crate::kind::Kind;
 use crate::manifest::{Bracket, Manifest};
 use crate::time::TimeMs;
 
@@ -101,19 +102,19 @@ impl TimeSample {
         let bad = |key: &ObjectKey, reason: &str| {
             Err(ContractError::invalid("sample", key.as_str(), reason))
         };
-        if !self.domain.is_in("domain") {
+        if !self.domain.is_in(Kind::Domain.folder()) {
             return bad(&self.domain, "a domain is wanted");
         }
         let after = self.after.as_ref();
         let fields = self.before.iter().chain(after.map(|after| &after.field));
         for field in fields {
-            if !field.is_in("frames") {
+            if !field.is_in(Kind::Field.folder()) {
                 return bad(field, "a field is wanted");
             }
         }
         let counts = self.contributed.iter();
         for key in counts.flat_map(|counts| counts.before.iter().chain(&counts.after)) {
-            if !key.is_in("contributed") {
+            if !key.is_in(Kind::Contributed.folder()) {
                 return bad(key, "counts of steps are wanted");
             }
         }

@@ -396,7 +396,12 @@ pub(crate) struct Camera {
     pub(crate) lat: Option<f64>,
     /// Height of the camera above the ground, km, 1 to 1e6; -1 to -1000 below the sea surface, among what sank as deep as
     /// it is drawn.
-    #[arg(long, default_value_t = 15_000.0, allow_negative_numbers = true)]
+    #[arg(
+        long,
+        visible_alias = "height-km",
+        default_value_t = 15_000.0,
+        allow_negative_numbers = true
+    )]
     pub(crate) height: f64,
     /// Place in the middle of the picture, degrees east and north: instead of the one below the camera.
     #[arg(
@@ -409,6 +414,7 @@ pub(crate) struct Camera {
     /// From the camera to the place that is looked at, km.
     #[arg(
         long,
+        visible_alias = "distance-km",
         value_name = "KM",
         default_value_t = 15_000.0,
         requires = "look_at"

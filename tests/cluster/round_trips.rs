@@ -25,6 +25,7 @@ const LONG_DELAY: Duration = Duration::from_millis(700);
 /// A question with what passed to the store before its answer, and when that came.
 struct Asked {
     before: Vec<Passed>,
+    begun: Instant,
     answered: Instant,
 }
 
@@ -54,6 +55,7 @@ fn ask(cluster: &Cluster, tile: &str, time: &str) -> Asked {
     let passed = cluster.s3.passed().into_iter();
     Asked {
         before: passed.filter(during).collect(),
+        begun,
         answered,
     }
 }
@@ -63,9 +65,12 @@ impl Asked {
         self.before.iter().map(|one| one.line.as_str()).collect()
     }
 
-    /// The picture is stored, and was so after its answer.
+    /// The picture was looked for once, and is stored once, after its answer.
     fn assert_stored_behind(&self, cluster: &Cluster) {
-        let is_write = |one: &&Passed| one.line.starts_with("PUT") && one.line.contains("/tiles/");
+        let is_tile = |one: &&Passed| one.line.contains("/tiles/");
+        let is_write = |one: &&Passed| one.line.starts_with("PUT") && is_tile(one);
+        let looks = self.before.iter().filter(is_tile).count();
+        assert_eq!(looks, 1, "looks for the picture: {:?}", self.lines());
         assert!(
             !self.before.iter().any(|one| is_write(&one)),
             "stored before the answer: {:?}",
@@ -80,6 +85,13 @@ impl Asked {
             Ok(written.max().filter(|at| *at > self.answered))
         };
         cluster.wait_for("stored picture", LIMIT, written).unwrap();
+        let passed = cluster.s3.passed();
+        let of_this = passed.iter().filter(|one| one.begun >= self.begun);
+        let of_tile: Vec<&str> = of_this
+            .filter(is_tile)
+            .map(|one| one.line.as_str())
+            .collect();
+        assert_eq!(of_tile.len(), 2, "one look and one write: {of_tile:?}");
     }
 }
 

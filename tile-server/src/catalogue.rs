@@ -50,12 +50,12 @@ struct State {
     snapshot: Arc<Snapshot>,
     /// Raised when what is known may have changed: who began to read before that has read the past.
     epoch: u64,
-    reading: Option<Reading>,
+    reading: Option<StoreRead>,
 }
 
 /// The store is being read, once for all who wait.
 #[derive(Clone)]
-struct Reading {
+struct StoreRead {
     begun: Instant,
     answer: Shared<BoxFuture<'static, Result<Arc<Snapshot>, ServerError>>>,
 }
@@ -243,7 +243,7 @@ impl Catalogue {
     }
 
     /// Begins to read the store; what comes of it is kept however long it takes.
-    fn read(&self, state: &mut State) -> Reading {
+    fn read(&self, state: &mut State) -> StoreRead {
         let (before, epoch) = (Arc::clone(&state.snapshot), state.epoch);
         let (reader, held) = (Arc::clone(&self.reader), Arc::clone(&self.state));
         let task = tokio::spawn(async move {
@@ -281,7 +281,7 @@ impl Catalogue {
             })
         };
         let answer = task.map(move |ended| ended.unwrap_or_else(lost));
-        let reading = Reading {
+        let reading = StoreRead {
             begun: Instant::now(),
             answer: answer.boxed().shared(),
         };

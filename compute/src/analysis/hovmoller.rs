@@ -3,7 +3,8 @@
 use std::sync::Arc;
 
 use contract::ContractError;
-use contract::analysis::{Along, Cited, Hovmoller, HovmollerBand, HovmollerQuery, HovmollerRow};
+use contract::analysis::{Along, Hovmoller, HovmollerBand, HovmollerQuery, HovmollerRow};
+use contract::cited::Cited;
 use contract::grid::Grid;
 use contract::manifest::{Manifest, Step};
 use contract::time::Period;

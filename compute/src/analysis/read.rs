@@ -1,6 +1,7 @@
 //! Series as they are analysed: read from a product, as periods with values beside them.
 
-use contract::analysis::{Cited, SeriesPlace, SeriesQuery};
+use contract::analysis::{SeriesPlace, SeriesQuery};
+use contract::cited::Cited;
 use contract::manifest::{Manifest, ManifestId};
 use contract::quantity::Quantity;
 use contract::time::Period;

@@ -1,7 +1,6 @@
 //! Steps as points in time, years apart, and their means over common bins.
 
-use contract::analysis::{CalendarBins, MeanStep};
-use contract::time::Period;
+use contract::time::{Period, TimeStep};
 
 /// Milliseconds in a Julian year of 365.25 days.
 pub const YEAR_MS: f64 = 365.25 * 86_400_000.0;
@@ -15,12 +14,12 @@ pub fn middles_years(periods: &[Period]) -> Vec<f64> {
     periods.iter().map(years).collect()
 }
 
-/// Means of steps over calendar months or years without a gap from the first to the last, NaN where less than half of a
+/// Means of steps over bins of the calendar without a gap from the first to the last, NaN where less than half of a
 /// bin's time holds data: each step counts by the time of it that lies in the bin. Steps as they are for `Native`.
 ///
 /// `periods` are in the order of time and do not overlap; `values` are beside them, NaN no data, any unit.
-pub fn means_over(periods: &[Period], values: &[f64], step: MeanStep) -> (Vec<Period>, Vec<f64>) {
-    if step == MeanStep::Native {
+pub fn means_over(periods: &[Period], values: &[f64], step: TimeStep) -> (Vec<Period>, Vec<f64>) {
+    if step == TimeStep::Native {
         return (periods.to_vec(), values.to_vec());
     }
     let bins = bins_over(periods, step);
@@ -45,39 +44,23 @@ pub fn means_over(periods: &[Period], values: &[f64], step: MeanStep) -> (Vec<Pe
     (bins, means)
 }
 
-/// What steps may be gathered in: months and years that are no shorter than they are, else steps as they are.
-pub fn no_shorter(periods: &[Period], step: MeanStep) -> MeanStep {
-    let longest_s = longest_s(periods);
-    match step {
-        MeanStep::Month if longest_s > CalendarBins::Month.longest_step_s() => MeanStep::Native,
-        MeanStep::Year if longest_s * 1000.0 > YEAR_MS * 1.01 => MeanStep::Native,
-        step => step,
+/// What steps may be gathered in: bins of the calendar that are no shorter than they are, else steps as they are.
+pub fn no_shorter(periods: &[Period], step: TimeStep) -> TimeStep {
+    match step.longest_step_s() {
+        Some(most_s) if longest_s(periods) > most_s => TimeStep::Native,
+        _ => step,
     }
 }
 
-/// Calendar months or years without a gap that some periods lie in, in the order of time; the periods themselves for `Native`.
-pub fn bins_over(periods: &[Period], step: MeanStep) -> Vec<Period> {
+/// Whole bins without a gap that some periods lie in, in the order of time; the periods themselves for `Native`.
+pub fn bins_over(periods: &[Period], step: TimeStep) -> Vec<Period> {
     match (step, periods.first(), periods.last()) {
-        (MeanStep::Month, Some(first), Some(last)) => bins(*first, *last, Period::month),
-        (MeanStep::Year, Some(first), Some(last)) => {
-            bins(*first, *last, |year, _month| Period::year(year))
-        }
-        _ => periods.to_vec(),
+        (TimeStep::Native, _, _) | (_, None, _) | (_, _, None) => periods.to_vec(),
+        (_, Some(first), Some(last)) => step.whole_bins(Period {
+            start: first.start,
+            end: last.end,
+        }),
     }
-}
-
-/// Calendar bins from the one that holds the first instant to the one that holds the last.
-fn bins<E>(first: Period, last: Period, of: impl Fn(i32, u32) -> Result<Period, E>) -> Vec<Period> {
-    let mut bins: Vec<Period> = vec![];
-    let mut at = first.start;
-    while at < last.end {
-        let (year, month) = at.year_month();
-        // The last years that an instant can name have no bin that ends in them.
-        let Ok(bin) = of(year, month) else { break };
-        bins.push(bin);
-        at = bin.end;
-    }
-    bins
 }
 
 /// The longest of some periods, s; 0 of none.
@@ -105,17 +88,17 @@ mod tests {
             period("2001-05-01", "2001-06-01"),
         ];
         let values = [10.0, 20.0, f64::NAN, 1.0, 3.0];
-        let (months, means) = means_over(&periods, &values, MeanStep::Month);
+        let (months, means) = means_over(&periods, &values, TimeStep::Month);
         assert_eq!(months.len(), 5);
         assert_eq!(months[1], Period::month(2001, 2).unwrap());
         assert!((means[0] - (28.0 * 10.0 + 3.0 * 20.0) / 31.0).abs() < 1e-12);
         // 5 of 28 days, 9 of 31, none: no means.
         assert!(means[1..4].iter().all(|mean| mean.is_nan()));
         assert!((means[4] - 3.0).abs() < 1e-12);
-        let (years, means) = means_over(&periods, &values, MeanStep::Year);
+        let (years, means) = means_over(&periods, &values, TimeStep::Year);
         assert_eq!((years.len(), means[0].is_nan()), (1, true));
-        let (as_they_are, _) = means_over(&periods, &values, MeanStep::Native);
+        let (as_they_are, _) = means_over(&periods, &values, TimeStep::Native);
         assert_eq!(as_they_are, periods);
-        assert_eq!(means_over(&[], &[], MeanStep::Month).0.len(), 0);
+        assert_eq!(means_over(&[], &[], TimeStep::Month).0.len(), 0);
     }
 }

@@ -2,9 +2,9 @@
 
 use contract::ContractError;
 use contract::analysis::{
-    CalendarBins, Correlation, CorrelationQuery, Difference, DifferenceSide, MeanStep, SeriesQuery,
+    CalendarBins, Correlation, CorrelationQuery, Difference, DifferenceSide, SeriesQuery,
 };
-use contract::time::Period;
+use contract::time::{Period, TimeStep};
 use futures::future::BoxFuture;
 
 use super::climatology::deseasonalised;
@@ -75,8 +75,12 @@ pub fn correlation<'a>(
 fn on_common_bins(
     a: &ReadSeries,
     b: &ReadSeries,
-    step: MeanStep,
+    step: TimeStep,
 ) -> Result<(Vec<Period>, [Vec<f64>; 2]), ContractError> {
+    if step == TimeStep::Total {
+        let reason = "one value does not vary: ask for shorter ones";
+        return Err(ContractError::invalid("step", step.as_str(), reason));
+    }
     for series in [a, b] {
         if no_shorter(&series.periods, step) != step {
             let product = &series.cited.product;
@@ -86,18 +90,8 @@ fn on_common_bins(
         }
     }
     let (bins_a, bins_b) = (bins_over(&a.periods, step), bins_over(&b.periods, step));
-    let common: Vec<Period> = match step {
-        MeanStep::Native => {
-            let both = bins_a
-                .iter()
-                .filter(|bin| bins_b.binary_search(bin).is_ok());
-            both.copied().collect()
-        }
-        MeanStep::Month | MeanStep::Year => {
-            let both = bins_a.iter().filter(|bin| bins_b.contains(bin));
-            both.copied().collect()
-        }
-    };
+    let in_both = |bin: &&Period| bins_b.binary_search(bin).is_ok();
+    let common: Vec<Period> = bins_a.iter().filter(in_both).copied().collect();
     if common.is_empty() {
         let covers =
             |series: &ReadSeries| format!("{} covers {}", series.cited.product, series.extent());
@@ -169,7 +163,7 @@ pub fn difference<'a>(
 /// Mean of a side, its error by the spread about the mean of each month where there are two years of them.
 fn of_side(series: &ReadSeries) -> MeanOverTime {
     let is_seasonal = longest_s(&series.periods) <= CalendarBins::Month.longest_step_s()
-        && means_over(&series.periods, &series.values, MeanStep::Month)
+        && means_over(&series.periods, &series.values, TimeStep::Month)
             .0
             .len()
             >= SEASONS_FROM_MONTHS;

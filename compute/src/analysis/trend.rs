@@ -1,7 +1,7 @@
 //! The trend of a series: seasons off, two slopes, a test.
 
-use contract::analysis::{CalendarBins, MeanStep, TheilSenTrend, Trend, TrendValue};
-use contract::time::{Period, TimeMs};
+use contract::analysis::{CalendarBins, TheilSenTrend, Trend, TrendValue};
+use contract::time::{Period, TimeMs, TimeStep};
 
 use super::climatology::{deseasonalised, mean};
 use super::extremes::percentile;
@@ -30,7 +30,7 @@ const DECADE: f64 = 10.0;
 pub fn trend(
     periods: &[Period],
     values: &[f64],
-    step: MeanStep,
+    step: TimeStep,
     unit: &str,
 ) -> Result<Trend, Undefined> {
     let step = no_shorter(periods, step);

@@ -2,12 +2,12 @@
 
 use std::collections::BTreeMap;
 
-use contract::budget::{BudgetHistory, BudgetQuery, BudgetStep, VersionBudget};
+use contract::budget::{BudgetHistory, BudgetQuery, VersionBudget};
 use contract::grid::Grid;
 use contract::key::ObjectKey;
 use contract::manifest::Manifest;
 use contract::quantity::Quantity;
-use contract::time::{Period, TimeMs};
+use contract::time::{Period, TimeMs, TimeStep};
 use futures::future::BoxFuture;
 use storage::manifests;
 
@@ -101,10 +101,10 @@ pub fn history<'a>(
     query: &'a BudgetQuery,
 ) -> BoxFuture<'a, Result<BudgetHistory, ComputeError>> {
     Box::pin(async move {
-        if query.step != BudgetStep::Total || query.parts.is_some() {
+        if query.step != TimeStep::Total || query.parts.is_some() {
             let reason = "a history is of one number: ask for the total of one region";
             return Err(
-                contract::ContractError::invalid("step", &query.step.to_string(), reason).into(),
+                contract::ContractError::invalid("step", query.step.as_str(), reason).into(),
             );
         }
         let published = manifests::published(engine.store(), &query.product).await?;

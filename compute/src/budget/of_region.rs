@@ -1,9 +1,9 @@
 //! The budget of one region: its weights, exact sums of every step, calendar rows with how uncertain they are.
 
-use contract::budget::{BudgetAnswer, BudgetQuery, BudgetStep};
+use contract::budget::{BudgetAnswer, BudgetQuery};
 use contract::manifest::{Manifest, Step};
 use contract::quantity::Quantity;
-use contract::time::Period;
+use contract::time::{Period, TimeStep};
 use storage::manifests;
 
 use super::accumulated;
@@ -11,7 +11,7 @@ use super::closure::of_time;
 use super::gaps::BASIS;
 use super::measure::Measure;
 use super::over_region::{AskedArea, over_region};
-use super::rows::{Asked, row_periods, rows};
+use super::rows::{RegionAreas, rows};
 use super::uncertainty;
 use crate::{ComputeError, Engine};
 
@@ -46,7 +46,7 @@ async fn of_flux(
 ) -> Result<BudgetAnswer, ComputeError> {
     let over = over_region(engine, manifest, steps, AskedArea::of(query), Measure::Mass).await?;
     let (sums, extent) = (over.sums, over.extent);
-    let asked = Asked {
+    let asked = RegionAreas {
         region_area_m2: extent.area_m2,
         ocean_area_m2: extent.ocean_m2,
         sea_steps: sums.sea_steps,
@@ -55,12 +55,13 @@ async fn of_flux(
     let too_large =
         || ComputeError::inconsistent(manifest.id().to_string(), "its sums exceed 128 bits");
     let rows_of = |periods: &[Period]| rows(periods, &sums.steps, &asked).ok_or_else(too_large);
-    let mut rows = rows_of(&row_periods(window, query.step)?)?;
+    let periods = query
+        .step
+        .bins(window, steps.iter().map(|step| step.period))?;
+    let mut rows = rows_of(&periods)?;
     let closure = match query.step {
-        BudgetStep::Total => None,
-        BudgetStep::Month | BudgetStep::Year => {
-            Some(of_time(&rows, &rows_of(&[window])?).ok_or_else(too_large)?)
-        }
+        TimeStep::Total => None,
+        _ => Some(of_time(&rows, &rows_of(&[window])?).ok_or_else(too_large)?),
     };
     let mut basis = None;
     if let Some(errors) = &query.errors {

@@ -1,7 +1,6 @@
 //! Calendar rows of a budget: exact sums of steps in, rows with budget and coverage out.
 
-use contract::ContractError;
-use contract::budget::{BudgetRow, BudgetStep};
+use contract::budget::BudgetRow;
 use contract::region::Cells;
 use contract::time::{Period, TimeMs};
 
@@ -42,7 +41,7 @@ impl StepSum {
 
 /// What sums are set against.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Asked {
+pub struct RegionAreas {
     /// Area of the region, land included, m².
     pub region_area_m2: f64,
     /// Area of the sea in it, wherever the grid lies, m².
@@ -56,33 +55,10 @@ pub struct Asked {
 /// Kilograms in a teragram.
 pub const KG_PER_TG: f64 = 1e9;
 
-/// The parts of `window` that rows cover, in the order of time.
-pub fn row_periods(window: Period, step: BudgetStep) -> Result<Vec<Period>, ContractError> {
-    if step == BudgetStep::Total {
-        return Ok(vec![window]);
-    }
-    let (mut year, mut month) = window.start.year_month();
-    let mut periods = vec![];
-    loop {
-        let calendar = match step {
-            BudgetStep::Month => Period::month(year, month)?,
-            BudgetStep::Year | BudgetStep::Total => Period::year(year)?,
-        };
-        periods.push(Period::new(
-            calendar.start.max(window.start),
-            calendar.end.min(window.end),
-        )?);
-        if calendar.end >= window.end {
-            return Ok(periods);
-        }
-        (year, month) = calendar.end.year_month();
-    }
-}
-
 /// One row of each period that some step reaches into.
 ///
 /// A step that lies partly inside counts by the share of its time; rows that follow each other share it out exactly. None if a sum leaves 128 bits.
-pub fn rows(periods: &[Period], sums: &[StepSum], asked: &Asked) -> Option<Vec<BudgetRow>> {
+pub fn rows(periods: &[Period], sums: &[StepSum], asked: &RegionAreas) -> Option<Vec<BudgetRow>> {
     let mut rows = vec![];
     for &period in periods {
         let first = sums.partition_point(|sum| sum.period.end <= period.start);
@@ -115,7 +91,7 @@ struct Total {
 }
 
 impl Total {
-    fn add(&mut self, sum: &StepSum, row: Period, asked: &Asked) -> Option<()> {
+    fn add(&mut self, sum: &StepSum, row: Period, asked: &RegionAreas) -> Option<()> {
         let start = sum.period.start.max(row.start);
         let end = sum.period.end.min(row.end);
         let inside_ms = end.ms() - start.ms();
@@ -134,7 +110,7 @@ impl Total {
         Some(())
     }
 
-    fn row(&self, period: Period, asked: &Asked) -> BudgetRow {
+    fn row(&self, period: Period, asked: &RegionAreas) -> BudgetRow {
         let m2_ms = |steps: i128| steps as f64 / 10f64.powi(AREA_DECIMALS as i32);
         let row_ms = (period.end.ms() - period.start.ms()) as f64;
         let covered_ms = self.covered_ms as f64;
@@ -176,10 +152,10 @@ mod tests {
     use super::*;
 
     /// A region of 200 m², half of it sea in one band.
-    fn asked(cells: Cells) -> Asked {
+    fn asked(cells: Cells) -> RegionAreas {
         let mut sea_steps = [0; BAND_COUNT];
         sea_steps[20] = 100_000_000;
-        Asked {
+        RegionAreas {
             region_area_m2: 200.0,
             ocean_area_m2: 100.0,
             sea_steps,
@@ -207,25 +183,6 @@ mod tests {
                 area_steps: 50_000_000,
             }],
         }
-    }
-
-    #[test]
-    fn months_of_a_window_are_cut_at_its_ends() {
-        let periods = row_periods(period("2000-01-16", "2000-03-02"), BudgetStep::Month).unwrap();
-        let expected = [
-            ("2000-01-16", "2000-02-01"),
-            ("2000-02-01", "2000-03-01"),
-            ("2000-03-01", "2000-03-02"),
-        ];
-        assert_eq!(periods, expected.map(|(start, end)| period(start, end)));
-        let years = row_periods(period("1999-12-31", "2001-01-01"), BudgetStep::Year).unwrap();
-        assert_eq!(
-            years,
-            [
-                period("1999-12-31", "2000-01-01"),
-                period("2000-01-01", "2001-01-01")
-            ]
-        );
     }
 
     #[test]

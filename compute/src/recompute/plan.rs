@@ -120,7 +120,8 @@ async fn fields_there(
     request: &Request,
 ) -> Result<BTreeSet<ObjectKey>, ComputeError> {
     let mut there = BTreeSet::new();
-    for folder in ["frames", "contributed"] {
+    for kind in [Kind::Field, Kind::Contributed] {
+        let folder = kind.folder();
         there.extend(store.list(&format!("{folder}/{target}")).await?);
     }
     let Some(latest) = latest.filter(|_| request.is_verified) else {

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
+use contract::cited::Cited;
 use contract::manifest::{Manifest, ManifestId};
 use contract::quantity::{Display, Quantity};
 use contract::statistics::{
@@ -47,7 +48,7 @@ pub fn statistics_of<'a>(
         let bins = query.step.bins(window, periods.iter().copied())?;
         let weighed = Weighed::of(engine, manifest, query).await?;
         let first = periods.partition_point(|period| period.end <= window.start);
-        let mut asked = Asked {
+        let mut asked = Reduction {
             engine,
             manifest,
             id: &id,
@@ -100,20 +101,13 @@ fn answer(
     weighed: Weighed,
     rows: Vec<StatisticsRow>,
 ) -> StatisticsAnswer {
-    let unit = manifest.quantity.display().unit;
     let note = |statistic: Statistic| StatisticNote {
         name: statistic.to_string(),
         unit: unit_of(statistic, manifest.quantity, weighed.size_unit),
         what: statistic.what(),
     };
     StatisticsAnswer {
-        product: manifest.product.clone(),
-        manifest: id,
-        title: manifest.title.clone(),
-        source: manifest.source.clone(),
-        synthetic: manifest.synthetic,
-        quantity: manifest.quantity,
-        unit: unit.to_owned(),
+        cited: Cited::of(manifest, id),
         kind: query.geometry.kind().to_owned(),
         geometry: query.geometry_name.clone(),
         step: query.step,
@@ -149,7 +143,7 @@ fn unit_of(statistic: Statistic, quantity: Quantity, size_unit: &str) -> String 
 }
 
 /// What every pass over the values is about.
-struct Asked<'a> {
+struct Reduction<'a> {
     engine: &'a Engine,
     manifest: &'a Manifest,
     /// The name of the version, which is costly to compute.
@@ -163,7 +157,7 @@ struct Asked<'a> {
     scale: Scale,
 }
 
-impl Asked<'_> {
+impl Reduction<'_> {
     /// Passes over the values. Sums of whole runs are remembered, and not asked for a second time.
     async fn accumulated(&self, wanted: Wanted) -> Result<Accumulated, ComputeError> {
         let weighed = self.weighed;

@@ -7,9 +7,8 @@ use async_trait::async_trait;
 use contract::geometry::AskedGeometry;
 use contract::grid::LonLatDeg;
 use contract::region::AskedRegion;
-use contract::statistics::{
-    Statistic, Statistics, StatisticsAnswer, StatisticsQuery, StatisticsStep,
-};
+use contract::statistics::{Statistic, Statistics, StatisticsAnswer, StatisticsQuery};
+use contract::time::TimeStep;
 use datafusion::arrow::array::{
     ArrayRef, Float64Array, RecordBatch, StringArray, TimestampMillisecondArray, UInt32Array,
 };
@@ -98,7 +97,7 @@ fn asked(product: &Named, place: &str, more: &[&str]) -> Result<StatisticsQuery,
     };
     let usual = StatisticsQuery::new(product.product.clone(), geometry);
     let step = match more.first() {
-        Some(step) => step.parse::<StatisticsStep>()?,
+        Some(step) => step.parse::<TimeStep>()?,
         None => usual.step,
     };
     let statistics = match more.get(1) {
@@ -209,7 +208,7 @@ fn rows(
     columns.push(Arc::new(Float64Array::from_iter_values(coverage)));
     let steps = rows.iter().map(|row| row.step_count);
     columns.push(Arc::new(UInt32Array::from_iter_values(steps)));
-    let units = rows.iter().map(|_row| &answer.unit);
+    let units = rows.iter().map(|_row| &answer.cited.unit);
     columns.push(Arc::new(StringArray::from_iter_values(units)));
     Ok(RecordBatch::try_new(Arc::clone(schema), columns)?)
 }

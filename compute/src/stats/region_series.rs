@@ -1,5 +1,6 @@
 //! The series of a product over a region: its mean over the cells that hold data, by area, for every step.
 
+use contract::cited::Cited;
 use contract::manifest::Manifest;
 use contract::series::{RegionSeries, RegionSeriesQuery, RegionValue};
 use futures::future::BoxFuture;
@@ -50,13 +51,7 @@ pub fn region_series_of<'a>(
         };
         let series = sums.steps.iter().map(value).collect();
         Ok(RegionSeries {
-            product: manifest.product.clone(),
-            manifest: manifest.id(),
-            title: manifest.title.clone(),
-            source: manifest.source.clone(),
-            synthetic: manifest.synthetic,
-            quantity: manifest.quantity,
-            unit: display.unit.to_owned(),
+            cited: Cited::of(manifest, manifest.id()),
             region: query.region_name.clone(),
             region_area_m2: extent.area_m2,
             ocean_area_m2: extent.ocean_m2,

@@ -4,14 +4,14 @@ use std::sync::Mutex;
 
 use compute::derive::{DeriveProgress, derived};
 use compute::{Engine, derive_accumulated};
-use contract::budget::{BudgetQuery, BudgetStep};
+use contract::budget::BudgetQuery;
 use contract::earth::Earth;
 use contract::event::Body;
 use contract::grid::Grid;
 use contract::manifest::Manifest;
 use contract::product::ProductId;
 use contract::quantity::Quantity;
-use contract::time::{Period, TimeMs};
+use contract::time::{Period, TimeMs, TimeStep};
 use storage::Store;
 use storage::contributed::{self, Contributed};
 
@@ -242,7 +242,7 @@ async fn a_budget_of_sums_is_that_of_their_flux_and_says_which_are_complete() {
         ..total(product, "global")
     };
     let cell_m2 = TINY.cell_area_m2(0, Earth::Wgs84);
-    for step in [BudgetStep::Month, BudgetStep::Total] {
+    for step in [TimeStep::Month, TimeStep::Total] {
         let of_flux = ask(&engine, &question(&id, step)).await;
         let of_sums = ask(&engine, &question(&derived.product, step)).await;
         assert_eq!(of_sums.manifest, derived.id());
@@ -253,8 +253,8 @@ async fn a_budget_of_sums_is_that_of_their_flux_and_says_which_are_complete() {
             let own = sums.completeness.unwrap();
             // The second cell lacks February; of all three months it has two.
             let (complete, incomplete) = match (step, index) {
-                (BudgetStep::Month, 1) => (1.0, 0.0),
-                (BudgetStep::Month, _) => (2.0, 0.0),
+                (TimeStep::Month, 1) => (1.0, 0.0),
+                (TimeStep::Month, _) => (2.0, 0.0),
                 _ => (1.0, 1.0),
             };
             let cells = [own.complete_m2, own.incomplete_m2].map(|m2| m2 / cell_m2);
@@ -271,7 +271,7 @@ async fn a_budget_of_sums_is_that_of_their_flux_and_says_which_are_complete() {
     // Before accumulation started there is nothing to sum.
     let early = BudgetQuery {
         from: None,
-        ..question(&derived.product, BudgetStep::Total)
+        ..question(&derived.product, TimeStep::Total)
     };
     let start: TimeMs = "2001-01-11".parse().unwrap();
     assert_eq!(ask(&engine, &early).await.rows[0].start, start);

@@ -3,14 +3,14 @@
 use compute::analysis::{self, analyse};
 use compute::{Engine, ErrorClass};
 use contract::analysis::{
-    Along, AnalysisOptions, AnalysisPart, CorrelationQuery, HovmollerQuery, MeanStep, SeriesQuery,
+    Along, AnalysisOptions, AnalysisPart, CorrelationQuery, HovmollerQuery, SeriesQuery,
 };
 use contract::earth::Earth;
 use contract::grid::{Grid, LonLatDeg};
 use contract::manifest::Manifest;
 use contract::quantity::Quantity;
 use contract::series::RegionSeriesQuery;
-use contract::time::Period;
+use contract::time::{Period, TimeStep};
 use storage::Store;
 
 use crate::fixture::{folder_store, land, parts, product};
@@ -81,7 +81,7 @@ async fn a_region_and_a_cell_of_one_value_have_one_analysis_and_it_is_that_of_th
     assert!((a.theil_sen.slope_per_decade - b.theil_sen.slope_per_decade).abs() < 1e-6);
     let periods: Vec<Period> = manifest.steps.iter().map(|step| step.period).collect();
     let values: Vec<f64> = (0..120).map(|month| f64::from(rising(month))).collect();
-    let own = analysis::trend::trend(&periods, &values, MeanStep::Month, "m s⁻¹").unwrap();
+    let own = analysis::trend::trend(&periods, &values, TimeStep::Month, "m s⁻¹").unwrap();
     assert_eq!(b, own);
     let january = &point.climatology.unwrap().rows[0];
     assert!(
@@ -156,7 +156,7 @@ async fn a_product_that_follows_another_is_found_at_its_lag() {
     assert!((found.rows[6].correlation.unwrap() - 1.0).abs() < 1e-9);
     assert_eq!(found.end.to_string(), "2006-01-01T00:00:00Z");
     let native = CorrelationQuery {
-        step: MeanStep::Year,
+        step: TimeStep::Year,
         ..query.clone()
     };
     let found = analysis::correlation(&engine, (&a, &a_id), (&b, &b_id), &native)
@@ -231,7 +231,7 @@ async fn bands_are_means_by_area_and_time_and_say_what_they_cover() {
         along: Along::Lat,
         band_deg: None,
         bounds_deg: None,
-        step: MeanStep::Month,
+        step: TimeStep::Month,
         from: None,
         to: None,
         earth: Earth::Wgs84,
@@ -257,7 +257,7 @@ async fn bands_are_means_by_area_and_time_and_say_what_they_cover() {
     assert!((found.rows[1].coverage_percent[0] - 50.0).abs() < 1e-9);
     assert!((found.rows[0].coverage_percent[0] - 100.0).abs() < 1e-9);
     let years = HovmollerQuery {
-        step: MeanStep::Year,
+        step: TimeStep::Year,
         band_deg: Some(9.0),
         along: Along::Lon,
         bounds_deg: Some([-140.0, -19.0, -120.0, -18.0]),

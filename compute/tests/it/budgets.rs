@@ -1,11 +1,11 @@
 //! Budgets with known answers, and questions that have none.
 
 use compute::{ComputeError, Engine, ErrorClass, budget};
-use contract::budget::{BudgetQuery, BudgetStep};
+use contract::budget::BudgetQuery;
 use contract::earth::Earth;
 use contract::grid::Grid;
 use contract::quantity::Quantity;
-use contract::time::Period;
+use contract::time::{Period, TimeStep};
 
 use crate::fixture::{ONE_DEGREE, ask, folder_store, land, months, parts, product, total};
 
@@ -43,7 +43,7 @@ async fn an_even_flux_integrates_to_area_times_time() {
     let query = BudgetQuery {
         from: Some("2000-01-31".parse().unwrap()),
         to: Some("2000-02-11".parse().unwrap()),
-        step: BudgetStep::Month,
+        step: TimeStep::Month,
         ..total(&id, "179.5,0.25,-178.75,0.75")
     };
     let answer = ask(&engine, &query).await;
@@ -81,9 +81,9 @@ async fn months_and_years_and_the_total_are_the_same_mass() {
     let engine = Engine::standalone(store, parts(2));
     let mut sums = vec![];
     for (step, rows) in [
-        (BudgetStep::Month, 12),
-        (BudgetStep::Year, 1),
-        (BudgetStep::Total, 1),
+        (TimeStep::Month, 12),
+        (TimeStep::Year, 1),
+        (TimeStep::Total, 1),
     ] {
         let answer = ask(
             &engine,

@@ -3,13 +3,11 @@
 use std::sync::Arc;
 
 use compute::{Engine, ErrorClass, budget};
-use contract::budget::{
-    AskedRiver, BudgetAnswer, BudgetParts, BudgetQuery, BudgetStep, StatedRiver,
-};
+use contract::budget::{AskedRiver, BudgetAnswer, BudgetParts, BudgetQuery, StatedRiver};
 use contract::grid::Grid;
 use contract::quantity::{Quantity, SECONDS_PER_YEAR};
 use contract::region::{AskedRegion, Region, named_regions};
-use contract::time::{Period, TimeMs};
+use contract::time::{Period, TimeMs, TimeStep};
 
 use crate::fixture::{ONE_DEGREE, ask, folder_store, land, months, product, total, wavy_year};
 
@@ -80,8 +78,8 @@ async fn weeks_that_months_cut_sum_to_the_year_to_the_last_digit() {
         step,
         ..total(&product("weeks"), "-60,-30,100,60")
     };
-    let whole = ask(&engine, &of(BudgetStep::Total)).await;
-    for (step, rows) in [(BudgetStep::Month, 14), (BudgetStep::Year, 2)] {
+    let whole = ask(&engine, &of(TimeStep::Total)).await;
+    for (step, rows) in [(TimeStep::Month, 14), (TimeStep::Year, 2)] {
         let answer = ask(&engine, &of(step)).await;
         assert_eq!(answer.rows.len(), rows);
         let sum: i128 = answer.rows.iter().map(|row| steps(&row.budget_kg)).sum();
@@ -154,7 +152,7 @@ async fn regions_sum_to_the_whole_with_what_they_share_and_leave_out() {
     ] {
         let parts = regions(&squares);
         let query = BudgetQuery {
-            step: BudgetStep::Year,
+            step: TimeStep::Year,
             parts: Some(BudgetParts::Regions(parts.clone())),
             ..total(&product("wavy"), "10,-20,50,15")
         };
@@ -276,7 +274,7 @@ async fn a_river_flux_is_taken_off_by_the_length_of_rows() {
     .await;
     let engine = Engine::local(store);
     let of = |river: AskedRiver, to: Option<&str>| BudgetQuery {
-        step: BudgetStep::Month,
+        step: TimeStep::Month,
         to: to.map(|to| to.parse().unwrap()),
         river: Some(river),
         ..total(&id, "14n-50n")

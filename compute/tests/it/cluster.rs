@@ -5,14 +5,14 @@ use std::time::{Duration, Instant};
 use compute::computed::{Request, compute};
 use compute::reduce::statistics;
 use compute::{Engine, budget, derive_accumulated};
-use contract::budget::{BudgetAnswer, BudgetQuery, BudgetStep};
+use contract::budget::{BudgetAnswer, BudgetQuery};
 use contract::geometry::{AskedGeometry, Sampling};
 use contract::grid::LonLatDeg;
 use contract::manifest::{Manifest, Step};
 use contract::quantity::Quantity;
 use contract::region::{Polygon, Region};
-use contract::statistics::{StatisticsAnswer, StatisticsQuery, StatisticsStep};
-use contract::time::Period;
+use contract::statistics::{StatisticsAnswer, StatisticsQuery};
+use contract::time::{Period, TimeStep};
 use storage::Store;
 
 use crate::computed::{land_inputs, windy};
@@ -37,7 +37,7 @@ fn engine(store: &Store, cluster: &Cluster) -> Engine {
 
 fn monthly(region: &str) -> BudgetQuery {
     BudgetQuery {
-        step: BudgetStep::Month,
+        step: TimeStep::Month,
         ..total(&product("wavy"), region)
     }
 }
@@ -71,11 +71,7 @@ fn questions() -> Vec<BudgetQuery> {
 
 /// Percentiles, which take several passes over the values.
 fn percentiles() -> StatisticsQuery {
-    asked(
-        area(POLYGON),
-        "median,p5,p97.5,mean",
-        StatisticsStep::Season,
-    )
+    asked(area(POLYGON), "median,p5,p97.5,mean", TimeStep::Season)
 }
 
 /// Percentiles, extremes with their dates, a line, and a place between four cells.
@@ -86,9 +82,9 @@ fn of_statistics() -> Vec<StatisticsQuery> {
     let place = AskedGeometry::point(place, Sampling::Bilinear);
     vec![
         percentiles(),
-        asked(area("global"), extremes, StatisticsStep::Month),
-        asked(line, "mean,std,p90,min,max,sum", StatisticsStep::Year),
-        asked(place, "mean,median,max,coverage", StatisticsStep::Native),
+        asked(area("global"), extremes, TimeStep::Month),
+        asked(line, "mean,std,p90,min,max,sum", TimeStep::Year),
+        asked(place, "mean,median,max,coverage", TimeStep::Native),
     ]
 }
 

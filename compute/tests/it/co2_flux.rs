@@ -6,12 +6,12 @@ use std::sync::Arc;
 use compute::Engine;
 use compute::computed::co2_flux::{Below, Co2Flux, GasTransfer, Ice, Schmidt, Solubility, Source};
 use compute::computed::{Request, RequestedInput, compute};
-use contract::budget::{BudgetQuery, BudgetStep};
+use contract::budget::BudgetQuery;
 use contract::computed::{Computation, Matching};
 use contract::earth::Earth;
 use contract::quantity::Quantity;
 use contract::region::Cells;
-use contract::time::Period;
+use contract::time::{Period, TimeStep};
 use storage::Store;
 
 use crate::fixture::{ONE_DEGREE, ask, folder_store, land, months, parts, product, total};
@@ -228,7 +228,7 @@ async fn monthly(
     mask: &Arc<contract::manifest::Manifest>,
 ) -> Vec<f64> {
     let query = BudgetQuery {
-        step: BudgetStep::Month,
+        step: TimeStep::Month,
         earth: Earth::LocalRadius,
         cells: Cells::OceanShare,
         ocean: Some(Arc::clone(mask)),

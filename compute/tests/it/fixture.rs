@@ -4,7 +4,7 @@ use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
 use compute::{Engine, budget};
-use contract::budget::{BudgetAnswer, BudgetQuery, BudgetStep};
+use contract::budget::{BudgetAnswer, BudgetQuery};
 use contract::digest::Digest;
 use contract::earth::Earth;
 use contract::grid::Grid;
@@ -12,7 +12,7 @@ use contract::manifest::{MANIFEST_SCHEMA, Manifest, Step};
 use contract::product::ProductId;
 use contract::quantity::Quantity;
 use contract::region::Cells;
-use contract::time::Period;
+use contract::time::{Period, TimeStep};
 use storage::{Store, domain, fields, manifests};
 
 pub(crate) const ONE_DEGREE: Grid = Grid {
@@ -138,7 +138,7 @@ pub(crate) fn total(id: &ProductId, region: &str) -> BudgetQuery {
         region_name: region.to_owned(),
         from: None,
         to: None,
-        step: BudgetStep::Total,
+        step: TimeStep::Total,
         earth: Earth::Wgs84,
         cells: Cells::Whole,
         ocean: None,

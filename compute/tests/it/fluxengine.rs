@@ -6,12 +6,12 @@ use std::process::Command;
 use std::sync::Arc;
 
 use compute::Engine;
-use contract::budget::{BudgetQuery, BudgetStep};
+use contract::budget::BudgetQuery;
 use contract::earth::Earth;
 use contract::manifest::Manifest;
 use contract::quantity::Quantity;
 use contract::region::Cells;
-use contract::time::Period;
+use contract::time::{Period, TimeStep};
 use storage::Store;
 
 use crate::fixture::{ONE_DEGREE, ask, folder_store, land, months, parts, product, total};
@@ -103,7 +103,7 @@ async fn both_totals_come_out_under_the_choices_of_their_authors() {
         for (choice, independent) in &run.months_tg {
             let (earth, cells) = choice.split_once(' ').unwrap();
             let query = BudgetQuery {
-                step: BudgetStep::Month,
+                step: TimeStep::Month,
                 earth: earth.parse().unwrap(),
                 cells: cells.parse().unwrap(),
                 ocean: Some(Arc::clone(&mask)),

@@ -2,10 +2,10 @@
 
 use compute::budget::history;
 use compute::{Engine, ErrorClass};
-use contract::budget::{BudgetQuery, BudgetStep, ErrorWords};
+use contract::budget::{BudgetQuery, ErrorWords};
 use contract::grid::Grid;
 use contract::quantity::Quantity;
-use contract::time::Period;
+use contract::time::{Period, TimeStep};
 use storage::Store;
 use storage::manifests::{self, AtInstant};
 
@@ -136,7 +136,7 @@ async fn what_has_no_history_is_refused() {
     publish(&store, &[(1, 1e-9)]).await;
     let engine = Engine::local(store);
     let months = BudgetQuery {
-        step: BudgetStep::Month,
+        step: TimeStep::Month,
         ..total(&product("flux"), "global")
     };
     let refused = history(&engine, &months).await.unwrap_err();

@@ -1,9 +1,9 @@
 //! The same bits however many parts a budget is computed in, and in whatever order files are read.
 
 use compute::Engine;
-use contract::budget::{BudgetQuery, BudgetStep};
+use contract::budget::BudgetQuery;
 use contract::quantity::Quantity;
-use contract::time::Period;
+use contract::time::{Period, TimeStep};
 
 use crate::fixture::{ONE_DEGREE, ask, folder_store, land, parts, product, total, wavy_year};
 
@@ -26,7 +26,7 @@ async fn any_number_of_partitions_gives_the_same_bits_with_ballista_and_without(
         let mut rows = vec![];
         for region in ["global", "equatorial-pacific", "170.5,-33.3,-120.1,12.7"] {
             let query = BudgetQuery {
-                step: BudgetStep::Month,
+                step: TimeStep::Month,
                 ..total(&id, region)
             };
             rows.push(ask(&engine, &query).await.rows);

@@ -50,8 +50,8 @@ async fn a_place_has_the_series_of_its_cell_in_the_unit_people_read() {
             .await
             .unwrap();
         assert_eq!((answer.cell.row, answer.cell.col), (row, col));
-        assert_eq!(answer.unit, "°C");
-        assert_eq!(answer.manifest, manifest.id());
+        assert_eq!(answer.cited.unit, "°C");
+        assert_eq!(answer.cited.manifest, manifest.id());
         assert_eq!(answer.series.len(), 12);
         for (month, point) in answer.series.iter().enumerate() {
             if month == 2 {

@@ -9,8 +9,7 @@ use contract::chunk::{CHUNK_COLS, CHUNK_ROWS};
 use contract::grid::Grid;
 use contract::manifest::Manifest;
 use contract::quantity::Quantity;
-use contract::statistics::StatisticsStep;
-use contract::time::{Period, TimeMs};
+use contract::time::{Period, TimeMs, TimeStep};
 use cube::{BLOCK_CELLS, RUN_STEPS};
 use object_store::ObjectStore;
 use storage::Store;
@@ -95,7 +94,7 @@ async fn of_fields_a_degree_reads_no_more_than_twice_its_chunks() {
 }
 
 fn of(degree: &str) -> contract::statistics::StatisticsQuery {
-    let query = asked(area(degree), "mean,std,max,coverage", StatisticsStep::Total);
+    let query = asked(area(degree), "mean,std,max,coverage", TimeStep::Total);
     contract::statistics::StatisticsQuery {
         product: product("noise"),
         ..query

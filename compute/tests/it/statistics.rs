@@ -11,8 +11,8 @@ use contract::geometry::{AskedGeometry, Sampling};
 use contract::grid::{Grid, LonLatDeg};
 use contract::manifest::Manifest;
 use contract::quantity::Quantity;
-use contract::statistics::{StatisticsAnswer, StatisticsQuery, StatisticsStep};
-use contract::time::Period;
+use contract::statistics::{StatisticsAnswer, StatisticsQuery};
+use contract::time::{Period, TimeStep};
 use storage::Store;
 
 use crate::fixture::{folder_store, land, parts, product, wavy_year};
@@ -43,11 +43,7 @@ pub(crate) fn area(region: &str) -> AskedGeometry {
         .into()
 }
 
-pub(crate) fn asked(
-    geometry: AskedGeometry,
-    statistics: &str,
-    step: StatisticsStep,
-) -> StatisticsQuery {
+pub(crate) fn asked(geometry: AskedGeometry, statistics: &str, step: TimeStep) -> StatisticsQuery {
     StatisticsQuery {
         statistics: statistics.parse().unwrap(),
         step,
@@ -110,12 +106,9 @@ async fn statistics_of_a_polygon_are_those_of_plain_sums() {
     let display = Quantity::CarbonFlux.display();
     let seasons: [&[usize]; 5] = [&[0, 1], &[2, 3, 4], &[5, 6, 7], &[8, 9, 10], &[11]];
     for (step, bins) in [
-        (StatisticsStep::Native, (0..12).map(|i| vec![i]).collect()),
-        (
-            StatisticsStep::Season,
-            seasons.map(<[usize]>::to_vec).to_vec(),
-        ),
-        (StatisticsStep::Total, vec![(0..12).collect::<Vec<_>>()]),
+        (TimeStep::Native, (0..12).map(|i| vec![i]).collect()),
+        (TimeStep::Season, seasons.map(<[usize]>::to_vec).to_vec()),
+        (TimeStep::Total, vec![(0..12).collect::<Vec<_>>()]),
     ] {
         let query = asked(
             area(POLYGON),
@@ -172,7 +165,7 @@ async fn means_and_coverage_are_those_of_the_series_that_was_always_given() {
     let (_folder, store, _manifest, _steps) = landed().await;
     let engine = Engine::in_process(store, parts(2));
     for region in ["global", POLYGON, "170.5,-33.3,-120.1,12.7"] {
-        let query = asked(area(region), "mean", StatisticsStep::Native);
+        let query = asked(area(region), "mean", TimeStep::Native);
         let answer = statistics(&engine, &query).await.unwrap();
         let series =
             contract::series::RegionSeriesQuery::new(product("wavy"), region.parse().unwrap());
@@ -193,13 +186,13 @@ async fn answers(engine: &Engine) -> Vec<StatisticsAnswer> {
     let line = "170.5,-33.3;-120.1,12.7;-100,85;80,80";
     let mut all = vec![];
     for (geometry, step) in [
-        (area("global"), StatisticsStep::Month),
-        (area(POLYGON), StatisticsStep::Total),
-        (area(POLYGON), StatisticsStep::Week),
-        (AskedGeometry::line(line).unwrap(), StatisticsStep::Season),
+        (area("global"), TimeStep::Month),
+        (area(POLYGON), TimeStep::Total),
+        (area(POLYGON), TimeStep::Week),
+        (AskedGeometry::line(line).unwrap(), TimeStep::Season),
         (
             AskedGeometry::point(place, Sampling::Bilinear),
-            StatisticsStep::Native,
+            TimeStep::Native,
         ),
     ] {
         let query = asked(geometry, "mean,std,min,max,sum,p10,p97.5,count", step);
@@ -245,7 +238,7 @@ async fn values_of_fields_and_along_time_are_the_same() {
     let of = async |geometry: &AskedGeometry| {
         let engine = Engine::in_process(store.clone(), parts(2));
         let values = engine.values(&manifest, &manifest.id()).await.unwrap();
-        let query = asked(geometry.clone(), "mean,std,p90,min", StatisticsStep::Season);
+        let query = asked(geometry.clone(), "mean,std,p90,min", TimeStep::Season);
         let answer =
             compute::reduce::statistics_of(&engine, &query, &manifest, manifest.id()).await;
         (answer.unwrap().rows, values.time_major().len())
@@ -274,7 +267,7 @@ async fn a_point_is_its_cell_and_four_cells_are_weighed() {
         let asked = asked(
             AskedGeometry::point(place, sampling),
             "mean,count",
-            StatisticsStep::Native,
+            TimeStep::Native,
         );
         statistics(&engine, &asked).await.unwrap().rows
     };
@@ -325,11 +318,7 @@ async fn a_row_says_what_is_missing_and_too_little_is_withheld() {
             from: from.parse().ok(),
             to: to.parse().ok(),
             min_coverage: least.parse().unwrap(),
-            ..asked(
-                area(POLYGON),
-                "mean,min,count,coverage",
-                StatisticsStep::Month,
-            )
+            ..asked(area(POLYGON), "mean,min,count,coverage", TimeStep::Month)
         };
         statistics(&engine, &query).await.unwrap().rows
     };
@@ -372,11 +361,7 @@ async fn a_step_that_lies_across_two_rows_counts_in_both_by_its_time() {
         (period("2000-02-05", "2000-02-13"), constant(4e-9)),
     ];
     land(&store, &product("wavy"), Quantity::CarbonFlux, GRID, &steps).await;
-    let query = asked(
-        area("-40,-20,-10,10"),
-        "mean,min,max,std",
-        StatisticsStep::Month,
-    );
+    let query = asked(area("-40,-20,-10,10"), "mean,min,max,std", TimeStep::Month);
     let answer = statistics(&Engine::local(store), &query).await.unwrap();
     let factor = Quantity::CarbonFlux.display().factor;
     let of = |row: usize, name: &str| value(&answer, row, name) / factor / 1e-9;
@@ -393,7 +378,7 @@ async fn what_cannot_be_answered_is_refused_with_the_reason() {
     let engine = Engine::in_process(store.clone(), parts(2));
     let refused =
         async |query: StatisticsQuery| statistics(&engine, &query).await.unwrap_err().to_string();
-    let native = StatisticsStep::Native;
+    let native = TimeStep::Native;
     let outside = StatisticsQuery {
         from: "2010".parse().ok(),
         ..asked(area("global"), "mean", native)
@@ -413,7 +398,7 @@ async fn what_cannot_be_answered_is_refused_with_the_reason() {
     let years = StatisticsQuery {
         from: "0001".parse().ok(),
         to: "9999".parse().ok(),
-        ..asked(area("global"), "mean", StatisticsStep::Day)
+        ..asked(area("global"), "mean", TimeStep::Day)
     };
     assert!(refused(years).await.contains("longer ones"));
     // What crosses itself, or lies within one cell, has its right answer.

@@ -12,8 +12,8 @@ use contract::key::ObjectKey;
 use contract::manifest::Manifest;
 use contract::quantity::Quantity;
 use contract::region::Cells;
-use contract::statistics::{StatisticsQuery, StatisticsRow, StatisticsStep};
-use contract::time::{Period, TimeMs};
+use contract::statistics::{StatisticsQuery, StatisticsRow};
+use contract::time::{Period, TimeMs, TimeStep};
 use storage::Store;
 
 use crate::fixture::{folder_store, land, parts, product};
@@ -116,7 +116,7 @@ fn area(region: &str) -> AskedGeometry {
 fn asked(region: &str, statistics: &str) -> StatisticsQuery {
     StatisticsQuery {
         statistics: statistics.parse().unwrap(),
-        step: StatisticsStep::Native,
+        step: TimeStep::Native,
         ..StatisticsQuery::new(product("p"), area(region))
     }
 }
@@ -220,7 +220,7 @@ async fn any_region_has_the_same_bits_with_stored_sums_and_without() {
         both.agree_on(&query).await;
     }
     let month = StatisticsQuery {
-        step: StatisticsStep::Month,
+        step: TimeStep::Month,
         ..asked(&regions[5], "mean,std,min,max,median,p90,count")
     };
     both.agree_on(&month).await;

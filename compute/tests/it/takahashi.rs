@@ -5,10 +5,11 @@ use std::process::Command;
 
 use compute::published::INTEGRALS;
 use compute::{Engine, compare, derive_accumulated};
-use contract::budget::{BudgetQuery, BudgetStep};
+use contract::budget::BudgetQuery;
 use contract::check::Verdict;
 use contract::earth::Earth;
 use contract::quantity::Quantity;
+use contract::time::TimeStep;
 
 use crate::fixture::{ONE_DEGREE, ask, folder_store, land, parts, product, takahashi_year, total};
 
@@ -87,7 +88,7 @@ async fn read_as_centres_the_real_grids_would_fail_the_check() {
     let band = ask(
         &engine,
         &BudgetQuery {
-            step: BudgetStep::Year,
+            step: TimeStep::Year,
             ..total(&id, "50s-62s")
         },
     )

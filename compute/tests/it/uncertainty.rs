@@ -6,13 +6,13 @@ use std::process::Command;
 use std::sync::Arc;
 
 use compute::{Engine, ErrorClass, budget};
-use contract::budget::{BudgetErrors, BudgetQuery, BudgetStep, ErrorWords};
+use contract::budget::{BudgetErrors, BudgetQuery, ErrorWords};
 use contract::earth::Earth;
 use contract::grid::Grid;
 use contract::manifest::Manifest;
 use contract::quantity::{CARBON_KG_PER_MOL, Quantity, SECONDS_PER_YEAR};
 use contract::region::Cells;
-use contract::time::Period;
+use contract::time::{Period, TimeStep};
 use serde::Deserialize;
 use storage::Store;
 
@@ -140,25 +140,25 @@ async fn rows_of_months_add_by_squares_where_steps_are_on_their_own() {
         step,
         ..asked("even", "0,0,100,60", errors("15%", 800.0, days))
     };
-    let by_month = ask(&engine, &of(BudgetStep::Month, 0.0)).await.rows;
+    let by_month = ask(&engine, &of(TimeStep::Month, 0.0)).await.rows;
     let squares: f64 = by_month
         .iter()
         .map(|row| row.uncertainty.unwrap().sigma_tg.powi(2))
         .sum();
-    let whole = ask(&engine, &of(BudgetStep::Total, 0.0)).await.rows[0].uncertainty;
+    let whole = ask(&engine, &of(TimeStep::Total, 0.0)).await.rows[0].uncertainty;
     near(whole.unwrap().sigma_tg, squares.sqrt(), 1e-12);
     // Months that go together add up to more, at most to their sum.
     let sum: f64 = by_month
         .iter()
         .map(|row| row.uncertainty.unwrap().sigma_tg)
         .sum();
-    let joined = ask(&engine, &of(BudgetStep::Total, 90.0)).await.rows[0].uncertainty;
+    let joined = ask(&engine, &of(TimeStep::Total, 90.0)).await.rows[0].uncertainty;
     let joined = joined.unwrap().sigma_tg;
     assert!(
         joined > 1.2 * squares.sqrt() && joined < sum,
         "{joined} {sum}"
     );
-    let always = ask(&engine, &of(BudgetStep::Total, 1e6)).await.rows[0].uncertainty;
+    let always = ask(&engine, &of(TimeStep::Total, 1e6)).await.rows[0].uncertainty;
     near(always.unwrap().sigma_tg, sum, 1e-4);
 }
 
@@ -175,7 +175,7 @@ async fn any_number_of_parts_and_only_the_sea_of_cells() {
     )
     .await;
     let query = BudgetQuery {
-        step: BudgetStep::Month,
+        step: TimeStep::Month,
         ..asked("wavy", "100,-20,210,33.3", errors("25%", 600.0, 60.0))
     };
     let one = ask(&Engine::in_process(store.clone(), parts(1)), &query).await;

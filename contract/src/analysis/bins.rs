@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::ContractError;
-use crate::time::Period;
+use crate::time::{Period, TimeStep};
 
 /// Names of the months.
 const MONTHS: [&str; 12] = [
@@ -33,8 +33,6 @@ const SEASONS: [&str; 4] = [
 ];
 /// Days of the months of a leap year.
 const DAYS: [u32; 12] = [31, 29, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31];
-/// Seconds in a day.
-const DAY_S: f64 = 86_400.0;
 
 /// What part of the year a step belongs to: by the middle of its period.
 #[derive(
@@ -86,11 +84,12 @@ impl CalendarBins {
 
     /// Longest step that may lie in one bin, s: the longest bin with a day to spare, for steps of `30.4` days and the like.
     pub fn longest_step_s(self) -> f64 {
-        match self {
-            Self::Month => 32.0 * DAY_S,
-            Self::Season => 93.0 * DAY_S,
-            Self::Day => 1.5 * DAY_S,
-        }
+        let step = match self {
+            Self::Month => TimeStep::Month,
+            Self::Season => TimeStep::Season,
+            Self::Day => TimeStep::Day,
+        };
+        step.longest_step_s().unwrap_or(f64::INFINITY)
     }
 
     /// The bin that the middle of a period lies in, from 0.

@@ -3,10 +3,11 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use super::{Cited, MeanStep, SeriesPlace, SeriesQuery};
+use super::{AnalysisOptions, SeriesPlace, SeriesQuery};
 use crate::ContractError;
+use crate::cited::Cited;
 use crate::product::ProductId;
-use crate::time::TimeMs;
+use crate::time::{TimeMs, TimeStep};
 
 /// Most steps that one series is moved against the other.
 const MAX_LAG: u32 = 400;
@@ -19,7 +20,7 @@ pub struct CorrelationQuery {
     /// The second.
     pub with: ProductId,
     /// What they are compared in; `native` needs the same periods of both.
-    pub step: MeanStep,
+    pub step: TimeStep,
     /// Is the mean of each calendar month taken off both first?
     pub deseasonalise: bool,
     /// Most steps that one is moved against the other, at most 400.
@@ -39,7 +40,7 @@ impl CorrelationQuery {
         Ok(Self {
             series,
             with,
-            step: MeanStep::default(),
+            step: AnalysisOptions::USUAL_STEP,
             deseasonalise: false,
             max_lag,
         })
@@ -57,7 +58,7 @@ pub struct Correlation {
     #[serde(flatten)]
     pub place: SeriesPlace,
     /// What they are compared in.
-    pub step: MeanStep,
+    pub step: TimeStep,
     /// Was the mean of each calendar month taken off both first?
     pub deseasonalised: bool,
     /// First instant that both cover.

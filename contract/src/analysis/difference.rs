@@ -3,7 +3,8 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use super::{Cited, SeriesPlace};
+use super::SeriesPlace;
+use crate::cited::Cited;
 use crate::time::TimeMs;
 
 /// A difference of two means over time.

@@ -6,11 +6,11 @@ use std::str::FromStr;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use super::{Cited, MeanStep};
 use crate::ContractError;
+use crate::cited::Cited;
 use crate::earth::Earth;
 use crate::product::ProductId;
-use crate::time::TimeMs;
+use crate::time::{TimeMs, TimeStep};
 
 /// What bands lie along.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, ToSchema)]
@@ -62,7 +62,7 @@ pub struct HovmollerQuery {
     /// West, south, east, north of the cells whose middles count; all if absent. East lies above west, up to 360 degrees.
     pub bounds_deg: Option<[f64; 4]>,
     /// What a row covers.
-    pub step: MeanStep,
+    pub step: TimeStep,
     /// First instant; the product's first if absent.
     pub from: Option<TimeMs>,
     /// First instant after the asked period; the product's end if absent.
@@ -84,7 +84,7 @@ pub struct Hovmoller {
     /// West, south, east, north of the cells whose middles count.
     pub bounds_deg: [f64; 4],
     /// What a row covers; of months and years each step counts by the time that lies in it.
-    pub step: MeanStep,
+    pub step: TimeStep,
     /// Figure of the earth for areas.
     pub earth: Earth,
     /// Bands from the south or the west.

@@ -3,8 +3,7 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use super::MeanStep;
-use crate::time::TimeMs;
+use crate::time::{TimeMs, TimeStep};
 
 /// Trends of a series. Where steps are shorter than a year, the mean of each calendar month is taken off first, so that a
 /// season that begins or ends early is no trend.
@@ -13,7 +12,7 @@ pub struct Trend {
     /// Unit of every slope.
     pub slope_unit: String,
     /// Means that it is drawn through; of months and years those that hold data over half of their time.
-    pub step: MeanStep,
+    pub step: TimeStep,
     /// Was the mean of each calendar month taken off first?
     pub deseasonalised: bool,
     /// Number of values.

@@ -12,7 +12,7 @@ pub(super) struct Listed {
     pub(super) product: String,
     /// West, south, east, north, degrees.
     pub(super) bounds_deg: [f64; 4],
-    steps: Vec<Step>,
+    steps: Vec<ListedStep>,
     modes: Vec<String>,
 }
 
@@ -22,7 +22,7 @@ struct Products {
 }
 
 #[derive(Debug, Clone, Deserialize)]
-struct Step {
+struct ListedStep {
     start: TimeMs,
     end: TimeMs,
 }
@@ -72,7 +72,7 @@ fn chosen(products: Vec<Listed>, layer: Option<&ProductId>, mode: Mode) -> Resul
 impl Listed {
     /// The time in which it changes.
     pub(super) fn span(&self) -> Result<Span> {
-        let middle_ms = |step: &Step| i64::midpoint(step.start.ms(), step.end.ms());
+        let middle_ms = |step: &ListedStep| i64::midpoint(step.start.ms(), step.end.ms());
         let (first_ms, end_ms) = match &self.steps[..] {
             [] => bail!("the product has no steps"),
             [only] => (only.start.ms(), only.end.ms()),

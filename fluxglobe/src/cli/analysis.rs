@@ -6,13 +6,15 @@ use std::str::FromStr;
 use clap::Args;
 use contract::ContractError;
 use contract::analysis::{
-    Along, AnalysisOptions, AnalysisPart, BasePeriod, CalendarBins, MeanStep,
+    Along, AnalysisOptions, AnalysisPart, AnalysisWishes, BasePeriod, CalendarBins,
 };
 use contract::earth::Earth;
 use contract::grid::LonLatDeg;
 use contract::manifest::ManifestId;
 use contract::product::ProductId;
-use contract::time::TimeMs;
+use contract::time::{TimeMs, TimeStep};
+
+use super::statistics::STEPS;
 
 /// Heading of what is made of a series.
 const HEADING: &str = "Made of the series";
@@ -40,12 +42,12 @@ pub(crate) struct Analysis {
     /// Years of the climatology, both part of it: 1991/2020. All that the series covers if absent.
     #[arg(long, value_name = "FIRST/LAST", help_heading = HEADING)]
     base: Option<BasePeriod>,
-    /// Parts of the year of the climatology.
-    #[arg(long, default_value_t, value_name = "month|season|day", help_heading = HEADING)]
-    bins: CalendarBins,
-    /// Means that the trend is drawn through; steps as they are where those are longer.
-    #[arg(long, default_value_t, value_name = "month|year|native", help_heading = HEADING)]
-    trend_step: MeanStep,
+    /// Parts of the year of the climatology; months if absent.
+    #[arg(long, value_name = "month|season|day", help_heading = HEADING)]
+    bins: Option<CalendarBins>,
+    /// Means that the trend is drawn through; steps as they are where those are longer. Months if absent.
+    #[arg(long, value_name = STEPS, help_heading = HEADING)]
+    trend_step: Option<TimeStep>,
     /// Draw it too: the series (with --statistic mean,std also its spread), its climatology, its anomalies or its trend.
     #[arg(long, value_name = "FILE.svg|FILE.png", help_heading = HEADING)]
     pub(crate) plot: Option<PlotFile>,
@@ -74,12 +76,13 @@ impl Analysis {
                 None => Ok(None),
             };
         }
-        Ok(Some(AnalysisOptions {
+        let wishes = AnalysisWishes {
+            parts,
             base: self.base,
             bins: self.bins,
             trend_step: self.trend_step,
-            ..AnalysisOptions::new(parts)?
-        }))
+        };
+        wishes.options().map(Some)
     }
 }
 
@@ -103,12 +106,12 @@ pub(crate) struct StatsCorrelate {
     pub(crate) products: Vec<ProductId>,
     #[command(flatten)]
     pub(crate) place: Place,
-    /// Steps that one is moved against the other, at most 400; at lags above zero the first leads.
-    #[arg(long, default_value_t = 0, value_name = "STEPS")]
-    pub(crate) max_lag: u32,
-    /// What they are compared in; `native` needs the same periods of both.
-    #[arg(long, default_value_t, value_name = "month|year|native")]
-    pub(crate) step: MeanStep,
+    /// Steps that one is moved against the other, at most 400; at lags above zero the first leads. None if absent.
+    #[arg(long, value_name = "STEPS")]
+    pub(crate) max_lag: Option<u32>,
+    /// What they are compared in; `native` needs the same periods of both. Months if absent.
+    #[arg(long, value_name = STEPS)]
+    pub(crate) step: Option<TimeStep>,
     /// Take the mean of each calendar month off both first: two series with seasons always go together.
     #[arg(long)]
     pub(crate) deseasonalise: bool,
@@ -169,9 +172,9 @@ pub(crate) struct StatsHovmoller {
     /// Height or width of a band, degrees. The least of 1, 2, 5, 10 that is no less than a cell if absent.
     #[arg(long, value_name = "DEGREES")]
     pub(crate) band: Option<f64>,
-    /// What a row covers.
-    #[arg(long, default_value_t, value_name = "month|year|native")]
-    pub(crate) step: MeanStep,
+    /// What a row covers; months if absent. `total` is the profile of the bands over all the period.
+    #[arg(long, value_name = STEPS)]
+    pub(crate) step: Option<TimeStep>,
     /// `global`, a named region that is a box, or WEST,SOUTH,EAST,NORTH: cells whose middles lie in it.
     #[arg(long, allow_hyphen_values = true)]
     pub(crate) region: Option<String>,

@@ -1,11 +1,13 @@
 //! Options of `fluxglobe budget`.
 
 use clap::Args;
-use contract::budget::{AsOf, BudgetStep, BudgetWords, ErrorWords};
+use contract::budget::{AsOf, BudgetWords, ErrorWords};
 use contract::earth::Earth;
 use contract::product::ProductId;
 use contract::region::Cells;
-use contract::time::TimeMs;
+use contract::time::{TimeMs, TimeStep};
+
+use super::statistics::STEPS;
 
 /// Heading of what makes a budget uncertain.
 const UNCERTAINTY: &str = "Uncertainty";
@@ -28,9 +30,10 @@ pub(crate) struct Budget {
     /// First instant after the period. The product's end if absent.
     #[arg(long)]
     pub(crate) to: Option<TimeMs>,
-    /// What a row of the answer covers: a calendar month, a calendar year, or the total of the period.
-    #[arg(long, default_value_t, value_name = "month|year|total")]
-    pub(crate) step: BudgetStep,
+    /// What a row of the answer covers: one of the product's steps, a part of the calendar, or the total of the period, which is
+    /// usual.
+    #[arg(long, value_name = STEPS)]
+    pub(crate) step: Option<TimeStep>,
     /// Figure of the earth for areas: wgs84, sphere (R = 6371 km) or local-radius (as FluxEngine sums).
     #[arg(long, default_value = "wgs84")]
     pub(crate) earth: Earth,

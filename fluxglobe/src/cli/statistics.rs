@@ -5,10 +5,13 @@ use contract::earth::Earth;
 use contract::geometry::Sampling;
 use contract::product::ProductId;
 use contract::region::Cells;
-use contract::statistics::{MinCoverage, Statistics, StatisticsStep};
-use contract::time::TimeMs;
+use contract::statistics::{MinCoverage, Statistics, StatisticsWishes};
+use contract::time::{TimeMs, TimeStep};
 
 use super::analysis::{Analysis, PlotFile, StatsCorrelate, StatsDifference, StatsHovmoller};
+
+/// Steps of time that an answer may have.
+pub(crate) const STEPS: &str = "native|day|week|month|season|year|total";
 
 /// `fluxglobe stats`.
 #[derive(Debug, Subcommand)]
@@ -35,8 +38,8 @@ pub(crate) struct StatisticsOptions {
     #[arg(long, value_name = "mean,p90,...")]
     pub(crate) statistic: Option<Statistics>,
     /// What a row covers. Steps that lie in several rows count in each by their time there.
-    #[arg(long, value_name = "native|day|week|month|season|year|total")]
-    pub(crate) step: Option<StatisticsStep>,
+    #[arg(long, value_name = STEPS)]
+    pub(crate) step: Option<TimeStep>,
     /// Least coverage, percent: rows with less have no values and say so.
     #[arg(long, value_name = "PERCENT")]
     pub(crate) min_coverage: Option<MinCoverage>,
@@ -46,9 +49,15 @@ pub(crate) struct StatisticsOptions {
 }
 
 impl StatisticsOptions {
-    /// Is anything of it asked?
-    pub(crate) fn are_asked(&self) -> bool {
-        self.statistic.is_some() || self.step.is_some() || self.min_coverage.is_some() || self.csv
+    /// What is asked; comma-separated values are of statistics.
+    pub(crate) fn wishes(&self) -> StatisticsWishes {
+        let usual = self.csv.then(Statistics::default);
+        StatisticsWishes {
+            statistics: self.statistic.clone().or(usual),
+            step: self.step,
+            min_coverage: self.min_coverage,
+            ..StatisticsWishes::default()
+        }
     }
 }
 
@@ -80,14 +89,6 @@ pub(crate) struct StatsPoint {
     /// JSON instead of a table.
     #[arg(long)]
     pub(crate) json: bool,
-}
-
-impl StatsPoint {
-    /// Is more asked than the series of the cell?
-    pub(crate) fn are_statistics_asked(&self) -> bool {
-        let is_cut = self.from.is_some() || self.to.is_some();
-        is_cut || self.sampling.is_some() || self.statistics.are_asked()
-    }
 }
 
 /// `fluxglobe stats line`.
@@ -151,11 +152,4 @@ pub(crate) struct StatsPolygon {
     /// JSON instead of a table.
     #[arg(long)]
     pub(crate) json: bool,
-}
-
-impl StatsPolygon {
-    /// Is more asked than the mean at every step?
-    pub(crate) fn are_statistics_asked(&self) -> bool {
-        self.cells.is_some() || self.statistics.are_asked()
-    }
 }

@@ -6,16 +6,16 @@ mod together;
 
 use anyhow::{Result, bail};
 use compute::Engine;
-use contract::analysis::{AnalysisOptions, Cited, Hovmoller, HovmollerQuery, SeriesQuery};
+use contract::analysis::{AnalysisOptions, Hovmoller, HovmollerWishes, SeriesQuery};
+use contract::cited::Cited;
 use contract::manifest::Manifest;
 use contract::product::ProductId;
-use contract::region::Region;
 use storage::Store;
 
 use crate::cli::{PlotFile, Settings, StatsHovmoller};
 use crate::{deployment, plot, progress};
 
-pub(crate) use together::{correlate, difference};
+pub(crate) use together::{correlate, difference, series};
 
 /// What is printed and drawn of an analysis.
 pub(crate) struct Output<'a> {
@@ -71,17 +71,15 @@ pub(crate) async fn of_series(
 pub(crate) async fn hovmoller(settings: &Settings, options: &StatsHovmoller) -> Result<()> {
     let store = deployment::store(settings)?;
     let manifest = deployment::manifest(&store, &options.product, &settings.data).await?;
-    let region: Option<Region> = options.region.as_deref().map(str::parse).transpose()?;
-    let query = HovmollerQuery {
-        product: options.product.clone(),
-        along: options.along,
+    let wishes = HovmollerWishes {
         band_deg: options.band,
-        bounds_deg: region.map(|region| region.as_box()).transpose()?.flatten(),
+        region: options.region.as_deref().map(str::parse).transpose()?,
         step: options.step,
         from: options.from,
         to: options.to,
-        earth: options.earth,
+        earth: Some(options.earth),
     };
+    let query = wishes.query(options.product.clone(), options.along)?;
     let bar = progress::bar("means of bands", 1);
     let version = (&manifest, &manifest.id());
     let answer: Hovmoller = compute::analysis::hovmoller(&store, version, &query).await?;

@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use anyhow::{Result, bail};
 use compute::region::{file, mask};
-use contract::budget::{AsOf, BudgetAnswer, BudgetHistory, BudgetQuery, BudgetRow};
+use contract::budget::{AsOf, BudgetAnswer, BudgetHistory, BudgetQuery, BudgetRow, BudgetWishes};
 use contract::manifest::Manifest;
 use contract::product::ProductId;
 use contract::quantity::Quantity;
@@ -81,19 +81,16 @@ async fn query(settings: &Settings, store: &Store, options: &Budget) -> Result<B
         let manifest = deployment::manifest(store, &product, &settings.data).await?;
         versions.insert(product, Arc::new(manifest));
     }
-    let query = BudgetQuery {
+    let wishes = BudgetWishes {
+        region: Some(stored_region(settings, store, &options.region).await?),
         from: options.from,
         to: options.to,
         step: options.step,
-        earth: options.earth,
-        cells: options.cells,
+        earth: Some(options.earth),
+        cells: Some(options.cells),
         ocean: ocean(settings, store, options.ocean.as_ref()).await?,
-        ..BudgetQuery::new(
-            options.product.clone(),
-            stored_region(settings, store, &options.region).await?,
-        )
     };
-    Ok(besides.of(query, &versions)?)
+    Ok(besides.of(wishes.query(options.product.clone()), &versions)?)
 }
 
 fn say_what(answer: &BudgetAnswer) {

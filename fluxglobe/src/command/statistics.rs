@@ -8,49 +8,27 @@ use comfy_table::{CellAlignment, Table};
 use compute::reduce::statistics;
 use compute::region::file;
 use contract::geometry::AskedGeometry;
-use contract::grid::LonLatDeg;
-use contract::statistics::{StatisticsAnswer, StatisticsQuery, StatisticsRow};
+use contract::statistics::{StatisticsAnswer, StatisticsQuery, StatisticsRow, StatisticsWishes};
 
-use super::budget::{ocean, stored_region};
-use crate::cli::{PlotFile, Settings, StatisticsOptions, StatsLine, StatsPoint, StatsPolygon};
+use crate::cli::{PlotFile, Settings, StatisticsOptions, StatsLine};
 use crate::{deployment, plot, progress};
 
 /// How an answer is printed.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Form {
+pub(crate) enum Form {
     Table,
     Json,
     Csv,
 }
 
 impl Form {
-    fn of(options: &StatisticsOptions, is_json: bool) -> Self {
+    pub(crate) fn of(options: &StatisticsOptions, is_json: bool) -> Self {
         match (is_json, options.csv) {
             (true, _) => Self::Json,
             (false, true) => Self::Csv,
             (false, false) => Self::Table,
         }
     }
-}
-
-pub(crate) async fn point(settings: &Settings, options: &StatsPoint) -> Result<()> {
-    let place = LonLatDeg::new(options.lon, options.lat)?;
-    let asked = AskedGeometry::point(place, options.sampling.unwrap_or_default());
-    let query = StatisticsQuery {
-        from: options.from,
-        to: options.to,
-        ..query(
-            StatisticsQuery::new(options.product.clone(), asked),
-            &options.statistics,
-        )
-    };
-    run(
-        settings,
-        &query,
-        Form::of(&options.statistics, options.json),
-        options.analysis.plot.as_ref(),
-    )
-    .await
 }
 
 pub(crate) async fn line(settings: &Settings, options: &StatsLine) -> Result<()> {
@@ -63,58 +41,23 @@ pub(crate) async fn line(settings: &Settings, options: &StatsLine) -> Result<()>
     } else {
         AskedGeometry::line(&options.line)?
     };
-    let query = StatisticsQuery {
+    let wishes = StatisticsWishes {
         from: options.from,
         to: options.to,
-        earth: options.earth,
-        ..query(
-            StatisticsQuery::new(options.product.clone(), asked),
-            &options.statistics,
-        )
+        earth: Some(options.earth),
+        ..options.statistics.wishes()
     };
     run(
         settings,
-        &query,
+        &wishes.query(options.product.clone(), asked),
         Form::of(&options.statistics, options.json),
         options.plot.as_ref(),
     )
     .await
 }
 
-pub(crate) async fn polygon(settings: &Settings, options: &StatsPolygon) -> Result<()> {
-    let store = deployment::store(settings)?;
-    let region = stored_region(settings, &store, &options.region).await?;
-    let asked = region.into();
-    let query = StatisticsQuery {
-        from: options.from,
-        to: options.to,
-        earth: options.earth,
-        cells: options.cells.unwrap_or_default(),
-        ocean: ocean(settings, &store, options.ocean.as_ref()).await?,
-        ..query(
-            StatisticsQuery::new(options.product.clone(), asked),
-            &options.statistics,
-        )
-    };
-    run(
-        settings,
-        &query,
-        Form::of(&options.statistics, options.json),
-        options.analysis.plot.as_ref(),
-    )
-    .await
-}
-
-fn query(usual: StatisticsQuery, options: &StatisticsOptions) -> StatisticsQuery {
-    StatisticsQuery {
-        statistics: options.statistic.clone().unwrap_or_default(),
-        step: options.step.unwrap_or_default(),
-        min_coverage: options.min_coverage.unwrap_or_default(),
-        ..usual
-    }
-}
-
-async fn run(
+/// Asks, draws and prints.
+pub(crate) async fn run(
     settings: &Settings,
     query: &StatisticsQuery,
     form: Form,
@@ -136,14 +79,14 @@ async fn run(
     }
     progress::say(&format!(
         "{} in {}, {} of {} ({:.6e} {}) on the {} earth; cite {}",
-        answer.quantity.title(),
-        answer.unit,
+        answer.cited.quantity.title(),
+        answer.cited.unit,
         answer.kind,
         answer.geometry,
         answer.size,
         answer.size_unit,
         answer.earth,
-        answer.manifest
+        answer.cited.manifest
     ));
     for one in &answer.statistics {
         progress::say(&format!("{} ({}): {}", one.name, one.unit, one.what));
@@ -162,7 +105,7 @@ async fn run(
     for note in &answer.notes {
         progress::say(&format!("note: {note}"));
     }
-    progress::say(&answer.source);
+    progress::say(&answer.cited.source);
     Ok(())
 }
 

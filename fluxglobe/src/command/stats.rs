@@ -6,16 +6,17 @@ use comfy_table::presets::NOTHING;
 use comfy_table::{CellAlignment, Table};
 use compute::Engine;
 use compute::stats::region_series;
-use contract::analysis::SeriesQuery;
+use contract::analysis::{SeriesQuery, SeriesWishes};
 use contract::grid::LonLatDeg;
-use contract::series::{PointSeries, RegionSeries, RegionSeriesQuery};
+use contract::series::{PointSeries, RegionSeries};
+use contract::statistics::{PointQuestion, RegionQuestion, StatisticsWishes};
 
 use crate::cli::{Settings, StatsPoint, StatsPolygon};
 use crate::{deployment, plot, progress};
 
 use super::analysis::{self, Output};
 use super::budget::{ocean, stored_region};
-use super::statistics;
+use super::statistics::{self, Form};
 
 /// Width of the longest bar, characters.
 const BAR_CHARS: f64 = 30.0;
@@ -28,20 +29,37 @@ pub(crate) async fn point(settings: &Settings, options: &StatsPoint) -> Result<(
         json: options.json,
         plot: options.analysis.plot.as_ref(),
     };
-    if let Some(asked) = options.analysis.asked()? {
-        alone(options.sampling.is_some() || options.statistics.are_asked())?;
-        let query = SeriesQuery::Cell {
-            product: options.product.clone(),
-            place,
+    let wishes = StatisticsWishes {
+        from: options.from,
+        to: options.to,
+        sampling: options.sampling,
+        ..options.statistics.wishes()
+    };
+    if let Some(analysed) = options.analysis.asked()? {
+        let whole = StatisticsWishes {
+            from: None,
+            to: None,
+            ..wishes
+        };
+        let point = whole.at_point(options.product.clone(), place);
+        alone(matches!(point, PointQuestion::Series(_)))?;
+        let wishes = SeriesWishes {
+            place: Some(place),
             from: options.from,
             to: options.to,
+            ..SeriesWishes::default()
         };
         let store = deployment::store(settings)?;
-        return analysis::of_series(settings, store, &query, &asked, output).await;
+        let query = analysis::series(wishes, &options.product)?;
+        return analysis::of_series(settings, store, &query, &analysed, output).await;
     }
-    if options.are_statistics_asked() {
-        return statistics::point(settings, options).await;
-    }
+    let place = match wishes.at_point(options.product.clone(), place) {
+        PointQuestion::Statistics(query) => {
+            let form = Form::of(&options.statistics, options.json);
+            return statistics::run(settings, &query, form, output.plot).await;
+        }
+        PointQuestion::Series(place) => place,
+    };
     let store = deployment::store(settings)?;
     deployment::manifest(&store, &options.product, &settings.data).await?;
     let answer =
@@ -55,42 +73,46 @@ pub(crate) async fn point(settings: &Settings, options: &StatsPoint) -> Result<(
     progress::result(&table(&answer).to_string())?;
     progress::say(&format!(
         "{} in {}, mean of the cell around {:.4}, {:.4}; cite {}",
-        answer.quantity.title(),
-        answer.unit,
+        answer.cited.quantity.title(),
+        answer.cited.unit,
         answer.cell.lon_deg,
         answer.cell.lat_deg,
-        answer.manifest
+        answer.cited.manifest
     ));
-    progress::say(&answer.source);
+    progress::say(&answer.cited.source);
     Ok(())
 }
 
 pub(crate) async fn polygon(settings: &Settings, options: &StatsPolygon) -> Result<()> {
-    let analysed = options.analysis.asked()?;
-    if analysed.is_some() {
-        alone(options.are_statistics_asked())?;
-    } else if options.are_statistics_asked() {
-        return statistics::polygon(settings, options).await;
-    }
     let store = deployment::store(settings)?;
-    let query = RegionSeriesQuery {
-        from: options.from,
-        to: options.to,
-        earth: options.earth,
-        ocean: ocean(settings, &store, options.ocean.as_ref()).await?,
-        ..RegionSeriesQuery::new(
-            options.product.clone(),
-            stored_region(settings, &store, &options.region).await?,
-        )
-    };
     let output = Output {
         json: options.json,
         plot: options.analysis.plot.as_ref(),
     };
-    if let Some(asked) = analysed {
-        let query = SeriesQuery::Region(query);
-        return analysis::of_series(settings, store, &query, &asked, output).await;
-    }
+    let wishes = StatisticsWishes {
+        from: options.from,
+        to: options.to,
+        earth: Some(options.earth),
+        cells: options.cells,
+        ocean: ocean(settings, &store, options.ocean.as_ref()).await?,
+        ..options.statistics.wishes()
+    };
+    let region = stored_region(settings, &store, &options.region).await?;
+    let asked = wishes.over_region(options.product.clone(), region);
+    let query = match (options.analysis.asked()?, asked) {
+        (Some(analysed), asked) => {
+            let RegionQuestion::Series(query) = asked else {
+                return alone(false);
+            };
+            let query = SeriesQuery::Region(query);
+            return analysis::of_series(settings, store, &query, &analysed, output).await;
+        }
+        (None, RegionQuestion::Statistics(query)) => {
+            let form = Form::of(&options.statistics, options.json);
+            return statistics::run(settings, &query, form, output.plot).await;
+        }
+        (None, RegionQuestion::Series(query)) => query,
+    };
     deployment::manifest(&store, &options.product, &settings.data).await?;
     let bar = progress::bar("mean over the region", 1);
     let engine = deployment::region_engine(settings, store)?;
@@ -105,24 +127,24 @@ pub(crate) async fn polygon(settings: &Settings, options: &StatsPolygon) -> Resu
     progress::result(&region_table(&answer).to_string())?;
     progress::say(&format!(
         "{} in {}, mean over {} ({:.3} 10⁶ km²), each cell by its area on the {} earth; cite {}",
-        answer.quantity.title(),
-        answer.unit,
+        answer.cited.quantity.title(),
+        answer.cited.unit,
         answer.region,
         answer.region_area_m2 / M2_PER_MILLION_KM2,
         answer.earth,
-        answer.manifest
+        answer.cited.manifest
     ));
     progress::say(&format!("what is sea: {}", answer.ocean_source));
     for note in &answer.notes {
         progress::say(&format!("note: {note}"));
     }
-    progress::say(&answer.source);
+    progress::say(&answer.cited.source);
     Ok(())
 }
 
 /// What is made of a series is made of its means at all steps.
-fn alone(are_statistics_asked: bool) -> Result<()> {
-    if are_statistics_asked {
+fn alone(is_a_series: bool) -> Result<()> {
+    if !is_a_series {
         bail!(
             "--climatology, --anomaly, --trend, --season and --extremes are made of the means of all steps: leave \
              --statistic, --step, --min-coverage, --sampling, --cells and --csv out"
@@ -134,7 +156,7 @@ fn alone(are_statistics_asked: bool) -> Result<()> {
 fn region_table(answer: &RegionSeries) -> Table {
     let mut table = Table::new();
     table.load_preset(NOTHING);
-    let unit = answer.unit.as_str();
+    let unit = answer.cited.unit.as_str();
     table.set_header(["from", "to", unit, "% of sea", "10⁶ km² with data"]);
     for column in 2..5 {
         if let Some(column) = table.column_mut(column) {
@@ -163,7 +185,7 @@ fn table(answer: &PointSeries) -> Table {
     let mut table = Table::new();
     table.load_preset(NOTHING);
     let is_counted = answer.series.iter().any(|step| step.contributed.is_some());
-    let mut header = vec!["from", "to", answer.unit.as_str(), ""];
+    let mut header = vec!["from", "to", answer.cited.unit.as_str(), ""];
     if is_counted {
         header.extend(["steps with data", "% of time"]);
     }

@@ -4,9 +4,10 @@ use anyhow::Result;
 use comfy_table::presets::NOTHING;
 use comfy_table::{CellAlignment, Table};
 use compute::Engine;
-use contract::budget::{BudgetQuery, BudgetStep};
+use contract::budget::BudgetQuery;
 use contract::check::{AgainstPaper, Check, Stated};
 use contract::manifest::Manifest;
+use contract::time::TimeStep;
 
 use crate::progress;
 
@@ -62,7 +63,7 @@ fn judged(paper: &AgainstPaper) -> String {
 /// Monthly budgets of a synthetic product: nothing is published about it.
 pub(crate) async fn synthetic(engine: &Engine, flux: &Manifest) -> Result<String> {
     let query = BudgetQuery {
-        step: BudgetStep::Month,
+        step: TimeStep::Month,
         ..BudgetQuery::new(flux.product.clone(), "global".parse()?)
     };
     let answer = compute::budget::budget_of(engine, &query, flux).await?;

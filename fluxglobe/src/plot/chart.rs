@@ -1,6 +1,7 @@
 //! A chart of values against time: its axes, lines that break at gaps, and bands.
 
-use contract::analysis::{Cited, SeriesAnalysis};
+use contract::analysis::SeriesAnalysis;
+use contract::cited::Cited;
 use contract::time::{Period, TimeMs};
 use plotters::chart::ChartContext;
 use plotters::coord::types::RangedCoordf64;

@@ -1,7 +1,8 @@
 //! Series as lines and anomalies as bars against time.
 
 use anyhow::Result;
-use contract::analysis::{Anomalies, Cited, SeriesAnalysis};
+use contract::analysis::{Anomalies, SeriesAnalysis};
+use contract::cited::Cited;
 use contract::series::{PointSeries, RegionSeries};
 use plotters::prelude::{BLACK, Color as _, LineSeries, Rectangle};
 
@@ -9,15 +10,6 @@ use super::chart::{Point, axis_of, chart, label, lines, named, period, place};
 use super::page::{self, COLOURS, Words, range, with_unit};
 
 pub(super) fn of_point(answer: &PointSeries) -> Result<String> {
-    let cited = Cited {
-        product: answer.product.clone(),
-        manifest: answer.manifest.clone(),
-        title: answer.title.clone(),
-        source: answer.source.clone(),
-        synthetic: answer.synthetic,
-        quantity: answer.quantity,
-        unit: answer.unit.clone(),
-    };
     let points: Vec<Point> = answer
         .series
         .iter()
@@ -27,26 +19,17 @@ pub(super) fn of_point(answer: &PointSeries) -> Result<String> {
         "cell around {:.4}, {:.4}",
         answer.cell.lon_deg, answer.cell.lat_deg
     );
-    series(&cited, &place, &points)
+    series(&answer.cited, &place, &points)
 }
 
 pub(super) fn of_region(answer: &RegionSeries) -> Result<String> {
-    let cited = Cited {
-        product: answer.product.clone(),
-        manifest: answer.manifest.clone(),
-        title: answer.title.clone(),
-        source: answer.source.clone(),
-        synthetic: answer.synthetic,
-        quantity: answer.quantity,
-        unit: answer.unit.clone(),
-    };
     let points: Vec<Point> = answer
         .series
         .iter()
         .map(|step| (period(step.start, step.end), step.mean))
         .collect();
     series(
-        &cited,
+        &answer.cited,
         &format!("mean over {}", named(&answer.region)),
         &points,
     )

@@ -1,7 +1,7 @@
 //! What every plot has round it: a title, what was read in which version, from whom, and axes.
 
 use anyhow::{Result, anyhow};
-use contract::analysis::Cited;
+use contract::cited::Cited;
 use plotters::coord::Shift;
 use plotters::prelude::{
     Color as _, DrawingArea, IntoDrawingArea as _, IntoFont as _, RGBColor, SVGBackend, Text,

@@ -1,31 +1,18 @@
 //! Statistics by rows: the mean in a band of its standard deviation, and other statistics of its unit.
 
 use anyhow::{Result, bail};
-use contract::analysis::Cited;
 use contract::statistics::{Statistic, StatisticsAnswer, StatisticsRow};
 use plotters::prelude::{Color as _, LineSeries, PathElement};
 
 use super::chart::{Point, axis_of, band, chart, label, legend, lines, named, period};
 use super::page::{self, COLOURS, Words, range};
 
-#[expect(
-    clippy::too_many_lines,
-    reason = "one picture, drawn from top to bottom"
-)]
 pub(super) fn of_statistics(answer: &StatisticsAnswer) -> Result<String> {
-    let cited = Cited {
-        product: answer.product.clone(),
-        manifest: answer.manifest.clone(),
-        title: answer.title.clone(),
-        source: answer.source.clone(),
-        synthetic: answer.synthetic,
-        quantity: answer.quantity,
-        unit: answer.unit.clone(),
-    };
+    let cited = &answer.cited;
     let is_spread = |name: &str| name == Statistic::Std.to_string();
     let all = answer.statistics.iter();
     let names: Vec<&str> = all
-        .filter(|one| one.unit == answer.unit && !is_spread(&one.name))
+        .filter(|one| one.unit == cited.unit && !is_spread(&one.name))
         .map(|one| one.name.as_str())
         .take(COLOURS.len())
         .collect();
@@ -67,13 +54,13 @@ pub(super) fn of_statistics(answer: &StatisticsAnswer) -> Result<String> {
             ""
         }
     );
-    let words = Words::of(&cited, &named(&answer.geometry), below);
+    let words = Words::of(cited, &named(&answer.geometry), below);
     let drawn: Vec<(&str, Vec<Point>)> = names.iter().map(|name| (*name, of_name(name))).collect();
     page::drawn(&words, |area| {
         let axis = axis_of(&mean);
         let lines_of = drawn.iter().map(|(_, points)| points).chain([&low, &high]);
         let values = range(lines_of.flatten().filter_map(|(_, value)| *value));
-        let mut chart = chart(area, &axis, values, &label(&cited))?;
+        let mut chart = chart(area, &axis, values, &label(cited))?;
         band(&mut chart, &axis, &low, &high)?;
         for ((name, points), colour) in drawn.iter().zip(COLOURS) {
             lines(&mut chart, &axis, points, colour)?;

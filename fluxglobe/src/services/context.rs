@@ -4,6 +4,7 @@ use std::net::SocketAddr;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use anyhow::{Context as _, Result, bail};
+use contract::kind::Kind;
 use kafka_log::{KafkaLog, KafkaSettings};
 use service::admin::Admin;
 use service::{Board, Parts, Registry, ServiceError, Stop, until_there};
@@ -102,7 +103,7 @@ impl ServiceContext {
             let asked = asked.clone();
             async move {
                 asked
-                    .folders("manifests")
+                    .folders(Kind::Manifest.folder())
                     .await
                     .map(|found| format!("products: {}", found.len()))
             }

@@ -85,7 +85,7 @@ pub(super) fn read(content: &[u8], source: Source<'_>) -> Result<Found, Rejectio
     }
     let is_socat = columns.measured.iter().any(|m| m.is_flagged);
     let stem = name::stem(source.file_name);
-    let mut reading = Reading {
+    let mut reading = TableReader {
         dataset: name::dataset(source, if is_socat { "socat" } else { stem }),
         lone_platform: name::platform(stem).unwrap_or_else(|| "1".to_owned()),
         gathered: Gathered::default(),
@@ -118,7 +118,7 @@ pub(super) fn read(content: &[u8], source: Source<'_>) -> Result<Found, Rejectio
 }
 
 /// What was read of a table so far.
-struct Reading {
+struct TableReader {
     dataset: ProductId,
     /// Name of the platform where no column says it.
     lone_platform: String,
@@ -126,7 +126,7 @@ struct Reading {
     spans: BTreeMap<String, Span>,
 }
 
-impl Reading {
+impl TableReader {
     fn take(&mut self, columns: &Columns, row: &Row<'_>) -> Result<(), Rejection> {
         let platform = row.text(columns.platform).and_then(name::platform);
         let platform = platform.unwrap_or_else(|| self.lone_platform.clone());

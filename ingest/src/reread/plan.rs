@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use contract::digest::Digest;
 use contract::key::ObjectKey;
+use contract::kind::Kind;
 use contract::manifest::{Manifest, Step};
 use futures::{StreamExt as _, TryStreamExt as _};
 use storage::{Store, manifests, verify};
@@ -142,7 +143,8 @@ impl<'a> Known<'a> {
         request: &Request,
     ) -> Result<Self, IngestError> {
         let product = &manifest.product;
-        let list = async |folder: &str| {
+        let list = async |kind: Kind| {
+            let folder = kind.folder();
             let listed = store.list(&format!("{folder}/{product}")).await;
             listed.map_err(IngestError::storage("list what is stored"))
         };
@@ -152,7 +154,7 @@ impl<'a> Known<'a> {
                 notes.entry(raw).or_default().push(key);
             }
         }
-        let mut fields: BTreeSet<ObjectKey> = list("frames").await?.into_iter().collect();
+        let mut fields: BTreeSet<ObjectKey> = list(Kind::Field).await?.into_iter().collect();
         if request.is_verified {
             let named = manifest.steps.iter().map(|step| step.field.clone());
             let damaged = verify::damaged(store, named)
@@ -165,7 +167,11 @@ impl<'a> Known<'a> {
             manifest,
             notes,
             fields,
-            raw: list("raw").await?.into_iter().filter_map(digest).collect(),
+            raw: list(Kind::Raw)
+                .await?
+                .into_iter()
+                .filter_map(digest)
+                .collect(),
         })
     }
 

@@ -198,7 +198,7 @@ async fn a_source_that_comes_back_gives_its_file() {
 }
 
 #[tokio::test]
-async fn a_server_that_is_not_there_is_given_up_when_patience_ends() {
+async fn a_server_that_is_not_there_is_given_up_at_its_limit() {
     let place = Place::new();
     let settings = guarded(&place, &["--allow-host", "127.0.0.1"]).unwrap();
     let (reason, line) = refused(&place, &settings, "http://127.0.0.1:9/a.nc").await;

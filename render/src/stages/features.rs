@@ -1,6 +1,6 @@
-//! What is the same for all of a picture and decides which parts of a kernel run. A graphics card jumps over the others. A
-//! program that runs shaders on vectors (lavapipe) runs both sides of every condition, so it is given a kernel for the
-//! features of a picture, in which other parts are not compiled: `feature` in `prelude.wgsl`.
+//! Uniform features of a picture, which decide what branches of a kernel are taken. Hardware jumps over the others; software
+//! adapters (lavapipe) execute both sides of a branch under a mask, so they get kernels specialised by override constants, in
+//! which the branches of other features are not compiled: `feature` in `prelude.wgsl`.
 
 use crate::stages::layout::{KERNEL_CLOUD, LIGHT_ALONE, LIGHT_OFF, LIGHT_OWN, VIEW_TILE};
 use crate::stages::params::Params;

@@ -18,7 +18,7 @@ use super::{EventLog, Finished, Follower, LowWater, Message, Reader, Start};
 use crate::StorageError;
 
 /// How long a lock held by another process is waited for.
-const LOCK_PATIENCE: Duration = Duration::from_secs(1);
+const LOCK_LIMIT: Duration = Duration::from_secs(1);
 const LOCK_PAUSE: Duration = Duration::from_millis(20);
 /// File of the log in its folder.
 const JOURNAL: &str = "journal.jsonl";
@@ -378,7 +378,7 @@ fn take_lock(lock: &File, folder: &Path) -> Result<(), StorageError> {
         match lock.try_lock() {
             Ok(()) => return Ok(()),
             Err(TryLockError::Error(error)) => return Err(failed(folder, error)),
-            Err(TryLockError::WouldBlock) if start.elapsed() < LOCK_PATIENCE => {
+            Err(TryLockError::WouldBlock) if start.elapsed() < LOCK_LIMIT => {
                 std::thread::sleep(LOCK_PAUSE);
             }
             Err(TryLockError::WouldBlock) => {

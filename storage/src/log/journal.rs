@@ -51,13 +51,13 @@ impl Journal {
     /// # Errors
     /// `Damaged` with the file and the entry if it does not hold what was written.
     pub(super) fn open(path: PathBuf) -> Result<(Self, Vec<Entry>), StorageError> {
-        let Reading {
+        let JournalReader {
             entries,
             seen,
             seen_bytes,
             torn_bytes,
             ..
-        } = Reading::of(&path)?.unwrap_or_default();
+        } = JournalReader::of(&path)?.unwrap_or_default();
         if torn_bytes > 0 {
             let file = OpenOptions::new().write(true).open(&path);
             let cut = file.and_then(|file| file.set_len(seen_bytes));
@@ -77,7 +77,7 @@ impl Journal {
     /// # Errors
     /// As of [`Journal::open`].
     pub(super) fn check(path: &Path) -> Result<Option<usize>, StorageError> {
-        Ok(Reading::of(path)?.map(|reading| reading.entries.len()))
+        Ok(JournalReader::of(path)?.map(|reading| reading.entries.len()))
     }
 
     pub(super) fn path(&self) -> &Path {
@@ -120,7 +120,7 @@ impl Journal {
 
 /// What was read of a file, from its first line on.
 #[derive(Default)]
-struct Reading {
+struct JournalReader {
     entries: Vec<Entry>,
     /// Of all whole lines so far.
     seen: Hasher,
@@ -131,7 +131,7 @@ struct Reading {
     torn_bytes: usize,
 }
 
-impl Reading {
+impl JournalReader {
     /// Reads a file; none if there is none.
     fn of(path: &Path) -> Result<Option<Self>, StorageError> {
         let content = match std::fs::read(path) {

@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 
 use contract::flow::{check_parts, northward_of};
 use contract::key::ObjectKey;
+use contract::kind::Kind;
 use contract::manifest::{Manifest, ManifestId};
 use contract::product::ProductId;
 use storage::{StorageError, Store, manifests};
@@ -15,7 +16,7 @@ use crate::metrics::Metrics;
 use crate::versions::Versions;
 
 /// Folder of all manifests; [`ObjectKey::manifest`] puts them there.
-pub(super) const FOLDER: &str = "manifests";
+pub(super) const FOLDER: &str = Kind::Manifest.folder();
 
 type Entry = (ObjectKey, Arc<Manifest>, ManifestId);
 

@@ -36,7 +36,7 @@ pub struct HotTile {
 }
 
 #[derive(Debug, Clone, Copy)]
-struct Asked {
+struct TileUse {
     times: u64,
     last: Instant,
 }
@@ -44,7 +44,7 @@ struct Asked {
 /// The hot tiles of one server.
 #[derive(Debug, Default)]
 pub struct HotTiles {
-    tiles: Mutex<HashMap<(ProductId, Mode, Place), Asked>>,
+    tiles: Mutex<HashMap<(ProductId, Mode, Place), TileUse>>,
 }
 
 impl HotTiles {
@@ -62,7 +62,7 @@ impl HotTiles {
         let mut tiles = self.lock();
         let entry = tiles
             .entry((product.clone(), mode, place))
-            .or_insert(Asked {
+            .or_insert(TileUse {
                 times: 0,
                 last: now,
             });
@@ -107,14 +107,14 @@ impl HotTiles {
         found.into_iter().take(most).map(hot).collect()
     }
 
-    fn lock(&self) -> MutexGuard<'_, HashMap<(ProductId, Mode, Place), Asked>> {
+    fn lock(&self) -> MutexGuard<'_, HashMap<(ProductId, Mode, Place), TileUse>> {
         // Changed by single insertions and removals: a poisoned lock guards a whole map.
         self.tiles.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
 /// Forgets the half that was asked for the longest time ago; what stays counts half, so that old fame fades.
-fn forget_half(tiles: &mut HashMap<(ProductId, Mode, Place), Asked>) {
+fn forget_half(tiles: &mut HashMap<(ProductId, Mode, Place), TileUse>) {
     let mut last: Vec<Instant> = tiles.values().map(|asked| asked.last).collect();
     last.sort_unstable();
     let middle = last[last.len() / 2];

@@ -4,9 +4,9 @@ use axum::Json;
 use axum::extract::State;
 use axum::http::header;
 use axum::response::{IntoResponse as _, Response};
-use contract::analysis::{AnalysisOptions, AnalysisPart, SeriesAnalysis, SeriesQuery};
+use contract::analysis::{AnalysisPart, AnalysisWishes, SeriesAnalysis, SeriesQuery, SeriesWishes};
 use contract::grid::LonLatDeg;
-use contract::series::RegionSeriesQuery;
+use contract::time::TimeStep;
 use serde::Deserialize;
 use utoipa::IntoParams;
 
@@ -28,7 +28,8 @@ pub(crate) struct AnalysisParameters {
     base: Option<String>,
     /// Parts of the year of the climatology: `month` (the default), `season` or `day`.
     bins: Option<String>,
-    /// Means that the trend is drawn through: `month` (the default), `year` or `native`.
+    /// Means that the trend is drawn through; `month` unless told otherwise.
+    #[param(value_type = Option<TimeStep>)]
     trend_step: Option<String>,
     /// Longitude of a cell, degrees east, -180 to 360; with `lat`, in place of a region.
     #[param(value_type = Option<f64>)]
@@ -73,20 +74,21 @@ pub(crate) async fn get(
     let parts = parts
         .filter(|part| !part.is_empty())
         .map(str::parse::<AnalysisPart>);
-    let options = AnalysisOptions {
+    let wishes = AnalysisWishes {
+        parts: parts.collect::<Result<_, _>>()?,
         base: parsed(asked.base.as_deref())?,
-        bins: parsed(asked.bins.as_deref())?.unwrap_or_default(),
-        trend_step: parsed(asked.trend_step.as_deref())?.unwrap_or_default(),
-        ..AnalysisOptions::new(parts.collect::<Result<_, _>>()?)?
+        bins: parsed(asked.bins.as_deref())?,
+        trend_step: parsed(asked.trend_step.as_deref())?,
     };
-    let asked = AskedSeries {
+    let options = wishes.options()?;
+    let text = SeriesText {
         place: [asked.lon.as_deref(), asked.lat.as_deref()],
         region: asked.region.as_deref(),
         period: [asked.from.as_deref(), asked.to.as_deref()],
         earth: asked.earth.as_deref(),
         ocean: asked.ocean.as_deref(),
     };
-    let series = asked.query(&state, &layer).await?;
+    let series = text.query(&state, &layer).await?;
     let of = version(&layer);
     answer(
         &state,
@@ -100,7 +102,7 @@ pub(crate) async fn get(
 }
 
 /// A cell or a region, and a period, as an address has them.
-pub(crate) struct AskedSeries<'a> {
+pub(crate) struct SeriesText<'a> {
     /// Longitude and latitude.
     pub(crate) place: [Option<&'a str>; 2],
     pub(crate) region: Option<&'a str>,
@@ -110,42 +112,43 @@ pub(crate) struct AskedSeries<'a> {
     pub(crate) ocean: Option<&'a str>,
 }
 
-impl AskedSeries<'_> {
+impl SeriesText<'_> {
     /// The question, if it can be asked of a version.
     pub(crate) async fn query(
         &self,
         state: &AppState,
         layer: &Layer,
     ) -> Result<SeriesQuery, ServerError> {
-        let product = layer.manifest.product.clone();
-        let [from, to] = [time(self.period[0])?, time(self.period[1])?];
-        // What cannot be asked waits for no turn.
-        layer.manifest.steps_inside(from, to)?;
-        match (self.region, self.place) {
-            (None, [Some(lon), Some(lat)]) => {
+        let missing = ServerError::Missing {
+            name: "region",
+            wanted: "a region, or lon and lat of a cell, and not both",
+        };
+        let place = match self.place {
+            [None, None] => None,
+            [Some(lon), Some(lat)] => {
                 let lon = number("lon", lon, "degrees east")?;
                 let lat = number("lat", lat, "degrees north, -90 to 90")?;
-                let place = LonLatDeg::new(lon, lat)?;
-                layer.manifest.cell_inside(place)?;
-                Ok(SeriesQuery::Cell {
-                    product,
-                    place,
-                    from,
-                    to,
-                })
+                Some(LonLatDeg::new(lon, lat)?)
             }
-            (Some(region), [None, None]) => Ok(SeriesQuery::Region(RegionSeriesQuery {
-                from,
-                to,
-                earth: parsed(self.earth)?.unwrap_or_default(),
-                ocean: ocean(state, self.ocean).await?,
-                ..RegionSeriesQuery::new(product, region.parse()?)
-            })),
-            _ => Err(ServerError::Missing {
-                name: "region",
-                wanted: "a region, or lon and lat of a cell, and not both",
-            }),
+            [Some(_), None] | [None, Some(_)] => return Err(missing),
+        };
+        let wishes = SeriesWishes {
+            place,
+            region: parsed(self.region)?,
+            from: time(self.period[0])?,
+            to: time(self.period[1])?,
+            earth: parsed(self.earth)?,
+            ocean: ocean(state, self.ocean).await?,
+        };
+        // What cannot be asked waits for no turn.
+        layer.manifest.steps_inside(wishes.from, wishes.to)?;
+        let query = wishes
+            .query(layer.manifest.product.clone())
+            .ok_or(missing)?;
+        if let SeriesQuery::Cell { place, .. } = &query {
+            layer.manifest.cell_inside(*place)?;
         }
+        Ok(query)
     }
 }
 

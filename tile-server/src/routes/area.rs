@@ -6,16 +6,17 @@ use axum::extract::State;
 use axum::http::header;
 use axum::response::{IntoResponse as _, Response};
 use contract::earth::Earth;
-use contract::region::{AskedRegion, Cells};
-use contract::series::{RegionSeries, RegionSeriesQuery};
-use contract::statistics::{StatisticsQuery, StatisticsStep};
+use contract::region::Cells;
+use contract::series::RegionSeries;
+use contract::statistics::{RegionQuestion, StatisticsWishes};
+use contract::time::TimeStep;
 use serde::Deserialize;
 use utoipa::IntoParams;
 
 use crate::error::ServerError;
-use crate::extract::{UrlPath, UrlQuery, parsed, time};
+use crate::extract::{UrlPath, UrlQuery, parsed};
 use crate::routes::budget::ocean;
-use crate::routes::statistics::{Asked, SeriesOrStatistics, answer};
+use crate::routes::statistics::{SeriesOrStatistics, StatisticsText, answer};
 use crate::state::AppState;
 
 #[derive(Debug, Deserialize, IntoParams)]
@@ -38,7 +39,7 @@ pub(crate) struct AreaParameters {
     /// as `p90`. With this, `step` or `min_coverage` the answer is a `StatisticsAnswer`.
     statistic: Option<String>,
     /// What a row of statistics covers; `native` unless told otherwise.
-    #[param(value_type = Option<StatisticsStep>)]
+    #[param(value_type = Option<TimeStep>)]
     step: Option<String>,
     /// Least coverage, percent: rows of statistics with less have no values; 0 unless told otherwise.
     #[param(value_type = Option<f64>, minimum = 0, maximum = 100)]
@@ -76,35 +77,23 @@ pub(crate) async fn get(
             wanted: "global, a name that /api/regions lists, west,south,east,north in degrees, GeoJSON or WKT text",
         });
     };
-    let statistics = Asked {
+    let text = StatisticsText {
         statistic: asked.statistic.as_deref(),
         step: asked.step.as_deref(),
         min_coverage: asked.min_coverage.as_deref(),
         from: asked.from.as_deref(),
         to: asked.to.as_deref(),
+        earth: asked.earth.as_deref(),
     };
-    let earth = parsed(asked.earth.as_deref())?.unwrap_or_default();
-    let ocean = ocean(&state, asked.ocean.as_deref()).await?;
-    let (product, region) = (
-        layer.manifest.product.clone(),
-        region.parse::<AskedRegion>()?,
-    );
-    let cells = parsed(asked.cells.as_deref())?;
-    if statistics.are_statistics() || cells.is_some() {
-        let usual = StatisticsQuery {
-            earth,
-            ocean,
-            cells: cells.unwrap_or_default(),
-            ..StatisticsQuery::new(product, region.into())
-        };
-        return answer(&state, &layer, statistics.query(usual)?).await;
-    }
-    let query = RegionSeriesQuery {
-        from: time(asked.from.as_deref())?,
-        to: time(asked.to.as_deref())?,
-        earth,
-        ocean,
-        ..RegionSeriesQuery::new(product, region)
+    let wishes = StatisticsWishes {
+        cells: parsed(asked.cells.as_deref())?,
+        ocean: ocean(&state, asked.ocean.as_deref()).await?,
+        ..text.wishes()?
+    };
+    let product = layer.manifest.product.clone();
+    let query = match wishes.over_region(product, region.parse()?) {
+        RegionQuestion::Statistics(query) => return answer(&state, &layer, query).await,
+        RegionQuestion::Series(query) => query,
     };
     // What cannot be asked waits for no turn.
     layer.manifest.steps_inside(query.from, query.to)?;

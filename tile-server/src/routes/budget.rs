@@ -9,11 +9,12 @@ use axum::extract::State;
 use axum::http::header;
 use axum::response::{IntoResponse as _, Response};
 use contract::budget::{
-    AsOf, BudgetAnswer, BudgetHistory, BudgetQuery, BudgetStep, BudgetWords, ErrorWords,
+    AsOf, BudgetAnswer, BudgetHistory, BudgetQuery, BudgetWishes, BudgetWords, ErrorWords,
 };
 use contract::earth::Earth;
 use contract::manifest::Manifest;
 use contract::region::Cells;
+use contract::time::TimeStep;
 use serde::Deserialize;
 use utoipa::IntoParams;
 
@@ -34,7 +35,7 @@ pub(crate) struct BudgetParameters {
     /// First instant after the period; the product's own unless one is given.
     to: Option<String>,
     /// What a row covers; `total` unless told otherwise.
-    #[param(value_type = Option<BudgetStep>)]
+    #[param(value_type = Option<TimeStep>)]
     step: Option<String>,
     /// Figure of the earth for areas; `wgs84` unless one is given.
     #[param(value_type = Option<Earth>)]
@@ -77,16 +78,16 @@ pub(crate) struct BudgetParameters {
 impl BudgetParameters {
     /// The question about a version.
     async fn query(&self, state: &AppState, layer: &Layer) -> Result<BudgetQuery, ServerError> {
-        let region = self.region.as_deref().unwrap_or("global");
-        let query = BudgetQuery {
+        let wishes = BudgetWishes {
+            region: parsed(self.region.as_deref())?,
             from: time(self.from.as_deref())?,
             to: time(self.to.as_deref())?,
-            step: parsed(self.step.as_deref())?.unwrap_or_default(),
-            earth: parsed(self.earth.as_deref())?.unwrap_or_default(),
-            cells: parsed(self.cells.as_deref())?.unwrap_or_default(),
+            step: parsed(self.step.as_deref())?,
+            earth: parsed(self.earth.as_deref())?,
+            cells: parsed(self.cells.as_deref())?,
             ocean: ocean(state, self.ocean.as_deref()).await?,
-            ..BudgetQuery::new(layer.manifest.product.clone(), region.parse()?)
         };
+        let query = wishes.query(layer.manifest.product.clone());
         let besides = self.words()?.asked()?;
         let mut versions = BTreeMap::new();
         for product in besides.products() {

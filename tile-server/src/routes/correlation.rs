@@ -2,14 +2,15 @@
 
 use axum::extract::State;
 use axum::response::Response;
-use contract::analysis::{Correlation, CorrelationQuery};
+use contract::analysis::{Correlation, CorrelationWishes};
+use contract::time::TimeStep;
 use serde::Deserialize;
 use utoipa::IntoParams;
 
 use crate::backend::SeriesQuestion;
 use crate::error::ServerError;
 use crate::extract::{UrlPath, UrlQuery, parsed, whole_number};
-use crate::routes::analysis::{AskedSeries, answer, version};
+use crate::routes::analysis::{SeriesText, answer, version};
 use crate::state::AppState;
 
 #[derive(Debug, Deserialize, IntoParams)]
@@ -22,7 +23,8 @@ pub(crate) struct CorrelationParameters {
     /// Most steps that one is moved against the other, 0 (the default) to 400.
     #[param(value_type = Option<u32>, maximum = 400)]
     max_lag: Option<String>,
-    /// What they are compared in: `month` (the default), `year` or `native`, for which both need the same periods.
+    /// What they are compared in; `month` unless told otherwise. For `native` both need the same periods.
+    #[param(value_type = Option<TimeStep>)]
     step: Option<String>,
     /// `true`: the mean of each calendar month is taken off both first.
     #[param(value_type = Option<bool>)]
@@ -74,8 +76,7 @@ pub(crate) async fn get(
         .catalogue
         .version(with, asked.with_manifest.as_deref())
         .await?;
-    let max_lag = asked.max_lag.as_deref().unwrap_or("0");
-    let series = AskedSeries {
+    let series = SeriesText {
         place: [asked.lon.as_deref(), asked.lat.as_deref()],
         region: asked.region.as_deref(),
         period: [asked.from.as_deref(), asked.to.as_deref()],
@@ -83,22 +84,23 @@ pub(crate) async fn get(
         ocean: None,
     };
     let series = series.query(&state, &of).await?;
-    let max_lag = whole_number("max_lag", max_lag, "a whole number, 0 to 400")?;
-    let query = CorrelationQuery {
-        step: parsed(asked.step.as_deref())?.unwrap_or_default(),
+    let max_lag = asked.max_lag.as_deref();
+    let wishes = CorrelationWishes {
+        step: parsed(asked.step.as_deref())?,
         deseasonalise: match asked.deseasonalise.as_deref() {
-            None | Some("false") => false,
-            Some("true") => true,
+            None => None,
+            Some("false") => Some(false),
+            Some("true") => Some(true),
             Some(other) => {
-                return Err(ServerError::invalid(
-                    "deseasonalise",
-                    other,
-                    "true or false",
-                ));
+                let valid = "true or false";
+                return Err(ServerError::invalid("deseasonalise", other, valid));
             }
         },
-        ..CorrelationQuery::new(series, with.manifest.product.clone(), max_lag)?
+        max_lag: max_lag
+            .map(|text| whole_number("max_lag", text, "a whole number, 0 to 400"))
+            .transpose()?,
     };
+    let query = wishes.query(series, with.manifest.product.clone())?;
     let (of, with) = (version(&of), version(&with));
     answer(&state, SeriesQuestion::Correlation { of, with, query }).await
 }

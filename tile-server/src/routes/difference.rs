@@ -2,14 +2,14 @@
 
 use axum::extract::State;
 use axum::response::Response;
-use contract::analysis::{BasePeriod, Difference};
+use contract::analysis::{Difference, DifferenceWishes};
 use serde::Deserialize;
 use utoipa::IntoParams;
 
 use crate::backend::SeriesQuestion;
 use crate::error::ServerError;
 use crate::extract::{UrlPath, UrlQuery, parsed};
-use crate::routes::analysis::{AskedSeries, answer, version};
+use crate::routes::analysis::{SeriesText, answer, version};
 use crate::state::AppState;
 
 #[derive(Debug, Deserialize, IntoParams)]
@@ -62,7 +62,7 @@ pub(crate) async fn get(
         .catalogue
         .version(other, asked.minus_manifest.as_deref())
         .await?;
-    let series = AskedSeries {
+    let series = SeriesText {
         place: [asked.lon.as_deref(), asked.lat.as_deref()],
         region: asked.region.as_deref(),
         period: [None, None],
@@ -70,12 +70,11 @@ pub(crate) async fn get(
         ocean: None,
     };
     let series = series.query(&state, &of).await?;
-    let period: Option<BasePeriod> = parsed(asked.period.as_deref())?;
-    let minus_period = parsed(asked.minus_period.as_deref())?.or(period);
-    let series = series.in_years(period);
-    let other = series
-        .of_product(minus.manifest.product.clone())
-        .in_years(minus_period);
+    let wishes = DifferenceWishes {
+        period: parsed(asked.period.as_deref())?,
+        minus_period: parsed(asked.minus_period.as_deref())?,
+    };
+    let [series, other] = wishes.sides(&series, minus.manifest.product.clone());
     let question = SeriesQuestion::Difference {
         of: (version(&of), series),
         minus: (version(&minus), other),

@@ -167,7 +167,7 @@ pub(crate) async fn job(
 }
 
 /// What an address asks for, of which versions.
-struct Asked {
+struct GlobeRequest {
     layer: Arc<Layer>,
     request: PictureRequest,
     beside: Beside,
@@ -175,7 +175,7 @@ struct Asked {
     shown: Shown,
 }
 
-impl Asked {
+impl GlobeRequest {
     fn edition(&self) -> Result<Edition, ServerError> {
         let mut views = reference_views()?;
         // What is drawn over a picture depends on its camera.
@@ -227,7 +227,7 @@ async fn asked(
     product: &str,
     file: &str,
     query: &GlobeQuery,
-) -> Result<Asked, ServerError> {
+) -> Result<GlobeRequest, ServerError> {
     let name = file
         .strip_suffix(".png")
         .ok_or(ServerError::UnknownAddress)?;
@@ -245,7 +245,7 @@ async fn asked(
     let beside = query.surroundings.beside(&state.catalogue).await?;
     let job = request::job_of(&layer, &request, &beside)?;
     let shown = Shown::of(&layer, time);
-    Ok(Asked {
+    Ok(GlobeRequest {
         layer,
         request,
         beside,

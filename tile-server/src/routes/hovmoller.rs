@@ -2,8 +2,8 @@
 
 use axum::extract::State;
 use axum::response::Response;
-use contract::analysis::{Hovmoller, HovmollerQuery};
-use contract::region::Region;
+use contract::analysis::{Hovmoller, HovmollerWishes};
+use contract::time::TimeStep;
 use serde::Deserialize;
 use utoipa::IntoParams;
 
@@ -23,7 +23,8 @@ pub(crate) struct HovmollerParameters {
     /// Height or width of a band, degrees; the least of 1, 2, 5, 10 that is no less than a cell unless given.
     #[param(value_type = Option<f64>)]
     band: Option<String>,
-    /// What a row covers: `month` (the default), `year` or `native`.
+    /// What a row covers; `month` unless told otherwise. `total` is the profile of the bands over all the period.
+    #[param(value_type = Option<TimeStep>)]
     step: Option<String>,
     /// `global`, a named region that is a box, or `west,south,east,north` in degrees: cells whose middles lie in it; all of
     /// the grid unless given.
@@ -65,17 +66,15 @@ pub(crate) async fn get(
         .band
         .as_deref()
         .map(|band| number("band", band, "degrees"));
-    let region: Option<Region> = parsed(asked.region.as_deref())?;
-    let query = HovmollerQuery {
-        product: of.manifest.product.clone(),
-        along,
+    let wishes = HovmollerWishes {
         band_deg: band.transpose()?,
-        bounds_deg: region.map(|region| region.as_box()).transpose()?.flatten(),
-        step: parsed(asked.step.as_deref())?.unwrap_or_default(),
+        region: parsed(asked.region.as_deref())?,
+        step: parsed(asked.step.as_deref())?,
         from: time(asked.from.as_deref())?,
         to: time(asked.to.as_deref())?,
-        earth: parsed(asked.earth.as_deref())?.unwrap_or_default(),
+        earth: parsed(asked.earth.as_deref())?,
     };
+    let query = wishes.query(of.manifest.product.clone(), along)?;
     // What cannot be asked waits for no turn.
     of.manifest.steps_inside(query.from, query.to)?;
     let of = version(&of);

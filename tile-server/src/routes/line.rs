@@ -4,13 +4,14 @@ use axum::extract::State;
 use axum::response::Response;
 use contract::earth::Earth;
 use contract::geometry::AskedGeometry;
-use contract::statistics::{StatisticsAnswer, StatisticsQuery, StatisticsStep};
+use contract::statistics::StatisticsAnswer;
+use contract::time::TimeStep;
 use serde::Deserialize;
 use utoipa::IntoParams;
 
 use crate::error::ServerError;
-use crate::extract::{UrlPath, UrlQuery, parsed};
-use crate::routes::statistics::{Asked, answer};
+use crate::extract::{UrlPath, UrlQuery};
+use crate::routes::statistics::{StatisticsText, answer};
 use crate::state::AppState;
 
 #[derive(Debug, Deserialize, IntoParams)]
@@ -24,7 +25,7 @@ pub(crate) struct LineParameters {
     /// as `p90`; `mean` unless told otherwise.
     statistic: Option<String>,
     /// What a row covers; `native` unless told otherwise.
-    #[param(value_type = Option<StatisticsStep>)]
+    #[param(value_type = Option<TimeStep>)]
     step: Option<String>,
     /// First instant, ISO 8601 UTC; the product's own unless one is given.
     from: Option<String>,
@@ -64,16 +65,15 @@ pub(crate) async fn get(
             wanted: "LON,LAT;LON,LAT;... in degrees, GeoJSON or WKT text",
         });
     };
-    let asked = Asked {
+    let text = StatisticsText {
         statistic: own.statistic.as_deref(),
         step: own.step.as_deref(),
         min_coverage: own.min_coverage.as_deref(),
         from: own.from.as_deref(),
         to: own.to.as_deref(),
+        earth: own.earth.as_deref(),
     };
-    let usual = StatisticsQuery {
-        earth: parsed(own.earth.as_deref())?.unwrap_or_default(),
-        ..StatisticsQuery::new(layer.manifest.product.clone(), AskedGeometry::line(line)?)
-    };
-    answer(&state, &layer, asked.query(usual)?).await
+    let product = layer.manifest.product.clone();
+    let query = text.wishes()?.query(product, AskedGeometry::line(line)?);
+    answer(&state, &layer, query).await
 }

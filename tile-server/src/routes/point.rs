@@ -4,16 +4,17 @@
 use axum::extract::State;
 use axum::http::header;
 use axum::response::{IntoResponse as _, Response};
-use contract::geometry::{AskedGeometry, Sampling};
+use contract::geometry::Sampling;
 use contract::grid::LonLatDeg;
 use contract::series::PointSeries;
-use contract::statistics::{StatisticsQuery, StatisticsStep};
+use contract::statistics::{PointQuestion, StatisticsWishes};
+use contract::time::TimeStep;
 use serde::Deserialize;
 use utoipa::IntoParams;
 
 use crate::error::ServerError;
 use crate::extract::{UrlPath, UrlQuery, number, parsed};
-use crate::routes::statistics::{Asked, SeriesOrStatistics, answer};
+use crate::routes::statistics::{SeriesOrStatistics, StatisticsText, answer};
 use crate::state::AppState;
 
 #[derive(Debug, Deserialize, IntoParams)]
@@ -30,7 +31,7 @@ pub(crate) struct PointParameters {
     /// as `p90`. With this, `step`, `min_coverage`, `from`, `to` or `sampling` the answer is a `StatisticsAnswer`.
     statistic: Option<String>,
     /// What a row of statistics covers; `native` unless told otherwise.
-    #[param(value_type = Option<StatisticsStep>)]
+    #[param(value_type = Option<TimeStep>)]
     step: Option<String>,
     /// Least coverage, percent: rows of statistics with less have no values; 0 unless told otherwise.
     #[param(value_type = Option<f64>, minimum = 0, maximum = 100)]
@@ -75,24 +76,27 @@ pub(crate) async fn get(
     let place = LonLatDeg::new(lon, lat)?;
     // What cannot be asked waits for no turn.
     layer.manifest.cell_inside(place)?;
-    let statistics = Asked {
+    let text = StatisticsText {
         statistic: asked.statistic.as_deref(),
         step: asked.step.as_deref(),
         min_coverage: asked.min_coverage.as_deref(),
         from: asked.from.as_deref(),
         to: asked.to.as_deref(),
+        earth: None,
     };
-    let sampling: Option<Sampling> = parsed(asked.sampling.as_deref())?;
-    let is_cut = asked.from.is_some() || asked.to.is_some();
-    if statistics.are_statistics() || is_cut || sampling.is_some() {
-        let point = AskedGeometry::point(place, sampling.unwrap_or_default());
-        let usual = StatisticsQuery::new(layer.manifest.product.clone(), point);
-        return answer(&state, &layer, statistics.query(usual)?).await;
-    }
-    let text = state.analyses.point(&layer, place).await?;
+    let wishes = StatisticsWishes {
+        sampling: parsed(asked.sampling.as_deref())?,
+        ..text.wishes()?
+    };
+    let product = layer.manifest.product.clone();
+    let place = match wishes.at_point(product, place) {
+        PointQuestion::Statistics(query) => return answer(&state, &layer, query).await,
+        PointQuestion::Series(place) => place,
+    };
+    let series = state.analyses.point(&layer, place).await?;
     let headers = [
         (header::CACHE_CONTROL, "no-cache"),
         (header::CONTENT_TYPE, "application/json"),
     ];
-    Ok((headers, text).into_response())
+    Ok((headers, series).into_response())
 }

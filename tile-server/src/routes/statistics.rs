@@ -3,7 +3,7 @@
 use axum::Json;
 use axum::http::header;
 use axum::response::{IntoResponse as _, Response};
-use contract::statistics::{StatisticsAnswer, StatisticsQuery};
+use contract::statistics::{StatisticsAnswer, StatisticsQuery, StatisticsWishes};
 use serde::Serialize;
 use utoipa::ToSchema;
 
@@ -25,31 +25,28 @@ pub(crate) enum SeriesOrStatistics<S: ToSchema> {
     Statistics(StatisticsAnswer),
 }
 
-/// What is asked besides a geometry.
+/// What `/point`, `/line` and `/area` may be asked besides a geometry.
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Asked<'a> {
+pub(crate) struct StatisticsText<'a> {
     pub(crate) statistic: Option<&'a str>,
     pub(crate) step: Option<&'a str>,
     pub(crate) min_coverage: Option<&'a str>,
     pub(crate) from: Option<&'a str>,
     pub(crate) to: Option<&'a str>,
+    pub(crate) earth: Option<&'a str>,
 }
 
-impl Asked<'_> {
-    /// Are statistics asked, rather than the series that was always given?
-    pub(crate) fn are_statistics(&self) -> bool {
-        self.statistic.is_some() || self.step.is_some() || self.min_coverage.is_some()
-    }
-
-    /// The question with what is asked.
-    pub(crate) fn query(&self, usual: StatisticsQuery) -> Result<StatisticsQuery, ServerError> {
-        Ok(StatisticsQuery {
-            statistics: parsed(self.statistic)?.unwrap_or_default(),
-            step: parsed(self.step)?.unwrap_or_default(),
-            min_coverage: parsed(self.min_coverage)?.unwrap_or_default(),
+impl StatisticsText<'_> {
+    /// What it means.
+    pub(crate) fn wishes(&self) -> Result<StatisticsWishes, ServerError> {
+        Ok(StatisticsWishes {
+            statistics: parsed(self.statistic)?,
+            step: parsed(self.step)?,
+            min_coverage: parsed(self.min_coverage)?,
             from: time(self.from)?,
             to: time(self.to)?,
-            ..usual
+            earth: parsed(self.earth)?,
+            ..StatisticsWishes::default()
         })
     }
 }

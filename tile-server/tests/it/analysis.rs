@@ -1,7 +1,8 @@
 //! `/api/products/{product}/analysis`, `correlation`, `difference` and `hovmoller`.
 
 use axum::http::StatusCode;
-use contract::analysis::{Along, AnalysisPart, CalendarBins, MeanStep, SeriesQuery};
+use contract::analysis::{Along, AnalysisPart, CalendarBins, SeriesQuery};
+use contract::time::TimeStep;
 use serde_json::json;
 use tile_server::backend::{Class, SeriesQuestion};
 
@@ -35,7 +36,7 @@ async fn every_parameter_of_an_analysis_reaches_the_analyst_once() {
     assert_eq!(options.base, "1991/2020".parse().ok());
     assert_eq!(
         (options.bins, options.trend_step),
-        (CalendarBins::Season, MeanStep::Year)
+        (CalendarBins::Season, TimeStep::Year)
     );
     assert_eq!(series.window(), ("2000-02".parse().ok(), None));
     assert!(matches!(series, SeriesQuery::Cell { place, .. } if place.lon > 9.9));
@@ -64,7 +65,7 @@ async fn two_series_and_bands_are_asked_for_with_what_belongs_to_them() {
     };
     assert_eq!(
         (query.max_lag, query.step, query.deseasonalise),
-        (7, MeanStep::Native, true)
+        (7, TimeStep::Native, true)
     );
     let path = "/api/products/sst/difference?region=global&period=2000/2000&minus_period=2000/2001";
     assert_eq!(app.get(path).await.status, StatusCode::OK);
@@ -85,7 +86,7 @@ async fn two_series_and_bands_are_asked_for_with_what_belongs_to_them() {
     };
     assert_eq!(
         (query.along, query.band_deg, query.step),
-        (Along::Lon, Some(5.0), MeanStep::Year)
+        (Along::Lon, Some(5.0), TimeStep::Year)
     );
     assert_eq!(query.bounds_deg, Some([100.0, 0.0, 130.0, 41.0]));
 }

@@ -1,10 +1,11 @@
 //! `/api/products/{product}/budget`.
 
 use axum::http::StatusCode;
-use contract::budget::{BudgetParts, BudgetQuery, BudgetStep};
+use contract::budget::{BudgetParts, BudgetQuery};
 use contract::earth::Earth;
 use contract::quantity::Quantity;
 use contract::region::{Cells, Region};
+use contract::time::TimeStep;
 use serde_json::json;
 use tile_server::backend::Class;
 
@@ -42,7 +43,7 @@ async fn an_answer_carries_everything_a_citation_needs() {
     let request = last(&app);
     assert_eq!(
         (request.region, request.step, request.earth),
-        (Region::Global, BudgetStep::Total, Earth::Wgs84)
+        (Region::Global, TimeStep::Total, Earth::Wgs84)
     );
 }
 
@@ -68,7 +69,7 @@ async fn every_parameter_reaches_the_analyst() {
     );
     assert_eq!(
         (request.step, request.earth),
-        (BudgetStep::Total, Earth::Sphere)
+        (TimeStep::Total, Earth::Sphere)
     );
     assert_eq!(request.cells, Cells::OceanShare);
     assert_eq!(body["cells"], json!("ocean-share"));

@@ -9,6 +9,7 @@ use async_trait::async_trait;
 use axum::body::Bytes;
 use contract::budget::{BudgetAnswer, BudgetHistory, BudgetQuery, BudgetRow, Completeness};
 use contract::check::Check;
+use contract::cited::Cited;
 use contract::encoding::Encoding;
 use contract::event::Event;
 use contract::grid::LonLatDeg;
@@ -266,13 +267,7 @@ impl Analyse for Analyst {
         }
         let center = manifest.grid.cell_center(row, col);
         Ok(PointSeries {
-            product: manifest.product.clone(),
-            manifest: id.clone(),
-            title: manifest.title.clone(),
-            source: manifest.source.clone(),
-            synthetic: manifest.synthetic,
-            quantity: manifest.quantity,
-            unit: manifest.quantity.display().unit.to_owned(),
+            cited: Cited::of(manifest, id.clone()),
             lon_deg: place.lon,
             lat_deg: place.lat,
             cell: Cell {
@@ -368,13 +363,7 @@ impl Analyse for Analyst {
         };
         let names = query.statistics.iter().map(|one| one.to_string());
         Ok(StatisticsAnswer {
-            product: manifest.product.clone(),
-            manifest: id.clone(),
-            title: manifest.title.clone(),
-            source: manifest.source.clone(),
-            synthetic: manifest.synthetic,
-            quantity: manifest.quantity,
-            unit: manifest.quantity.display().unit.to_owned(),
+            cited: Cited::of(manifest, id.clone()),
             kind: query.geometry.kind().to_owned(),
             geometry: query.geometry_name.clone(),
             step: query.step,
@@ -418,13 +407,7 @@ impl Analyse for Analyst {
             coverage_percent: 25.0 * index as f64,
         };
         Ok(RegionSeries {
-            product: manifest.product.clone(),
-            manifest: manifest.id(),
-            title: manifest.title.clone(),
-            source: manifest.source.clone(),
-            synthetic: manifest.synthetic,
-            quantity: manifest.quantity,
-            unit: manifest.quantity.display().unit.to_owned(),
+            cited: Cited::of(manifest, manifest.id()),
             region: query.region_name.clone(),
             region_area_m2: 4e12,
             ocean_area_m2: 3e12,

@@ -4,7 +4,8 @@ use axum::http::StatusCode;
 use contract::earth::Earth;
 use contract::geometry::{Geometry, Sampling};
 use contract::region::Cells;
-use contract::statistics::{StatisticsQuery, StatisticsStep};
+use contract::statistics::StatisticsQuery;
+use contract::time::TimeStep;
 use serde_json::json;
 
 use crate::app::TestApp;
@@ -34,10 +35,7 @@ async fn every_parameter_reaches_the_analyst_once() {
         panic!("{query:?}")
     };
     assert_eq!(line.edges().count(), 2);
-    assert_eq!(
-        (query.step, query.earth),
-        (StatisticsStep::Season, Earth::Sphere)
-    );
+    assert_eq!((query.step, query.earth), (TimeStep::Season, Earth::Sphere));
     let names: Vec<String> = query.statistics.iter().map(|one| one.to_string()).collect();
     assert_eq!(names, ["p90", "mean"]);
     assert_eq!(query.min_coverage.percent().to_bits(), 12.5f64.to_bits());

@@ -17,8 +17,8 @@ fn rising(count: u32) -> Vec<f64> {
 #[test]
 fn seasons_are_taken_off_before_slopes_are_sought() {
     // Ten years and a half: the warm half once more.
-    let found = trend(&months(126), &rising(126), MeanStep::Month, "°C").unwrap();
-    assert!(found.deseasonalised && found.step == MeanStep::Month);
+    let found = trend(&months(126), &rising(126), TimeStep::Month, "°C").unwrap();
+    assert!(found.deseasonalised && found.step == TimeStep::Month);
     assert_eq!(
         (found.slope_unit.as_str(), found.count),
         ("°C per decade", 126)
@@ -27,7 +27,7 @@ fn seasons_are_taken_off_before_slopes_are_sought() {
     near(found.theil_sen.slope_per_decade, 0.3, 0.05);
     near(found.least_squares.slope_per_decade, 0.3, 0.05);
     assert!(found.mann_kendall.p_value < 1e-6 && found.mann_kendall.tau > 0.8);
-    let yearly = trend(&months(120), &rising(120), MeanStep::Year, "").unwrap();
+    let yearly = trend(&months(120), &rising(120), TimeStep::Year, "").unwrap();
     assert_eq!(
         (yearly.count, yearly.slope_unit.as_str()),
         (10, "per decade")
@@ -40,8 +40,8 @@ fn seasons_are_taken_off_before_slopes_are_sought() {
 #[test]
 fn steps_longer_than_months_are_taken_as_they_are() {
     let years: Vec<Period> = (0..30).map(|y| Period::year(1980 + y).unwrap()).collect();
-    let found = trend(&years, &SLOW, MeanStep::Month, "m").unwrap();
-    assert!(found.step == MeanStep::Native && !found.deseasonalised);
+    let found = trend(&years, &SLOW, TimeStep::Month, "m").unwrap();
+    assert!(found.step == TimeStep::Native && !found.deseasonalised);
     near(
         found.theil_sen.slope_per_decade,
         0.608_695_652_173_913,
@@ -62,28 +62,28 @@ fn what_has_no_trend_is_refused_with_the_reason() {
             .unwrap_err()
             .to_string()
     };
-    let short = refused(48, &rising(48), MeanStep::Month);
+    let short = refused(48, &rising(48), TimeStep::Month);
     assert_eq!(short, "a trend needs 5 years of values, and they span 4.0");
     assert_eq!(
-        refused(60, &[f64::NAN; 60], MeanStep::Month),
+        refused(60, &[f64::NAN; 60], TimeStep::Month),
         "a trend needs 10 values, and there are 0"
     );
     assert_eq!(
-        refused(60, &rising(60), MeanStep::Year),
+        refused(60, &rising(60), TimeStep::Year),
         "a trend needs 10 values, and there are 5"
     );
-    assert!(refused(60, &[3.0; 60], MeanStep::Month).contains("all 60 values are equal"));
+    assert!(refused(60, &[3.0; 60], TimeStep::Month).contains("all 60 values are equal"));
     let mut one = vec![f64::NAN; 60];
     one[3] = 1.0;
     assert_eq!(
-        refused(60, &one, MeanStep::Month),
+        refused(60, &one, TimeStep::Month),
         "a trend needs 10 values, and there are 1"
     );
     // Five years are enough, also where the last month is missing.
     let mut five = rising(60);
     five[59] = f64::NAN;
-    assert!(trend(&months(60), &five, MeanStep::Month, "").is_ok());
+    assert!(trend(&months(60), &five, TimeStep::Month, "").is_ok());
     // Seasons alone, and nothing else: no trend, and nothing to tell it from.
     let seasons: Vec<f64> = (0..72).map(|m| f64::from(m % 12)).collect();
-    assert!(refused(72, &seasons, MeanStep::Month).contains("equal"));
+    assert!(refused(72, &seasons, TimeStep::Month).contains("equal"));
 }

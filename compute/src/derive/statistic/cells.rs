@@ -1,7 +1,7 @@
 //! Statistics of one cell: its values at all steps in, one value for each step that is written out.
 
-use contract::analysis::{CalendarBins, MapStatistic, MeanStep};
-use contract::time::Period;
+use contract::analysis::{CalendarBins, MapStatistic};
+use contract::time::{Period, TimeStep};
 
 use super::plan::Plan;
 use crate::analysis::climatology::spread;
@@ -110,7 +110,7 @@ impl OfCell {
                 })
             }
             MapStatistic::Trend | MapStatistic::TrendPValue => {
-                let found = trend(&self.periods, &as_f64(values), MeanStep::Month, "").ok()?;
+                let found = trend(&self.periods, &as_f64(values), TimeStep::Month, "").ok()?;
                 Some(match self.statistic {
                     MapStatistic::TrendPValue => found.mann_kendall.p_value,
                     _ => found.theil_sen.slope_per_decade,

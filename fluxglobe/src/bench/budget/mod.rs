@@ -52,7 +52,7 @@ const REGIONS: [(&str, &[[f64; 2]]); 3] = [
 ];
 
 /// A program that is asked for budgets.
-struct Asked {
+struct BenchedProgram {
     name: &'static str,
     program: PathBuf,
     /// All of its words but the last, which is a file with a region.
@@ -130,7 +130,7 @@ fn programs(
     options: &BenchBudget,
     file: &Path,
     landings: &mut Vec<(&'static str, Ran)>,
-) -> Result<Vec<Asked>> {
+) -> Result<Vec<BenchedProgram>> {
     let own = std::env::current_exe()?;
     let stem = file.with_extension("");
     let place = |ending: &str| format!("{}-{ending}", stem.display());
@@ -144,7 +144,7 @@ fn programs(
     let mut words = vec!["--data".to_owned(), store];
     words.extend(budget.split(' ').map(str::to_owned));
     words.extend([PRODUCT.to_owned(), "--region".to_owned()]);
-    let mut all = vec![Asked {
+    let mut all = vec![BenchedProgram {
         name: "fluxglobe",
         program: own,
         words,
@@ -160,7 +160,7 @@ fn programs(
         landings.push(("xarray, Zarr", ran(python, &words)?));
     }
     for (name, source) in [("xarray, NetCDF", path(file)), ("xarray, Zarr", zarr)] {
-        all.push(Asked {
+        all.push(BenchedProgram {
             name,
             program: python.clone(),
             words: vec![path(&script), "budget".to_owned(), source],
@@ -170,7 +170,7 @@ fn programs(
 }
 
 /// A first time, in which weights are computed and kept, and the others.
-fn time(asked: &Asked, region: &Path, runs: u16) -> Result<Timed> {
+fn time(asked: &BenchedProgram, region: &Path, runs: u16) -> Result<Timed> {
     let mut words = asked.words.clone();
     words.push(region.display().to_string());
     let ask = || -> Result<(f64, Ran)> {

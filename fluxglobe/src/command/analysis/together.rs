@@ -1,13 +1,9 @@
 //! `fluxglobe stats correlate` and `difference`: two series in; how they go together or differ out.
 
-use anyhow::{Result, bail};
+use anyhow::{Context as _, Result, bail};
 use compute::analysis;
-use contract::analysis::{CorrelationQuery, SeriesQuery};
-use contract::earth::Earth;
+use contract::analysis::{CorrelationWishes, DifferenceWishes, SeriesQuery, SeriesWishes};
 use contract::product::ProductId;
-use contract::region::AskedRegion;
-use contract::series::RegionSeriesQuery;
-use contract::time::TimeMs;
 use storage::Store;
 
 use super::{reader, say_source, tables, version};
@@ -23,14 +19,19 @@ pub(crate) async fn correlate(settings: &Settings, options: &StatsCorrelate) -> 
         );
     };
     let store = deployment::store(settings)?;
-    let period = [options.from, options.to];
-    let region = region(settings, &store, &options.place).await?;
-    let series = series(first, region, &options.place, period, options.earth)?;
-    let query = CorrelationQuery {
-        step: options.step,
-        deseasonalise: options.deseasonalise,
-        ..CorrelationQuery::new(series, second.clone(), options.max_lag)?
+    let wishes = SeriesWishes {
+        from: options.from,
+        to: options.to,
+        earth: Some(options.earth),
+        ..at(settings, &store, &options.place).await?
     };
+    let series = series(wishes, first)?;
+    let wishes = CorrelationWishes {
+        step: options.step,
+        deseasonalise: Some(options.deseasonalise),
+        max_lag: options.max_lag,
+    };
+    let query = wishes.query(series, second.clone())?;
     let a = deployment::manifest(&store, first, &settings.data).await?;
     let b = deployment::manifest(&store, second, &settings.data).await?;
     let bar = progress::bar("correlate", 1);
@@ -66,17 +67,16 @@ pub(crate) async fn difference(settings: &Settings, options: &StatsDifference) -
     )
     .await?;
     let minus = version(settings, &store, other, options.minus_manifest.as_ref()).await?;
-    let region = region(settings, &store, &options.place).await?;
-    let all = series(
-        &options.product,
-        region,
-        &options.place,
-        [None, None],
-        options.earth,
-    )?;
-    let of_series = all.in_years(options.period);
-    let minus_period = options.minus_period.or(options.period);
-    let minus_series = all.of_product(other.clone()).in_years(minus_period);
+    let wishes = SeriesWishes {
+        earth: Some(options.earth),
+        ..at(settings, &store, &options.place).await?
+    };
+    let all = series(wishes, &options.product)?;
+    let wishes = DifferenceWishes {
+        period: options.period,
+        minus_period: options.minus_period,
+    };
+    let [of_series, minus_series] = wishes.sides(&all, other.clone());
     let bar = progress::bar("compare", 1);
     let engine = reader(settings, store, &all)?;
     let (of_id, minus_id) = (of.id(), minus.id());
@@ -100,35 +100,21 @@ pub(crate) async fn difference(settings: &Settings, options: &StatsDifference) -
     Ok(())
 }
 
-/// The region that is asked for, if one is.
-async fn region(settings: &Settings, store: &Store, place: &Place) -> Result<Option<AskedRegion>> {
-    Ok(match &place.region {
+/// The cell or the region that is asked for.
+async fn at(settings: &Settings, store: &Store, place: &Place) -> Result<SeriesWishes> {
+    let region = match &place.region {
         Some(text) => Some(stored_region(settings, store, text).await?),
         None => None,
+    };
+    Ok(SeriesWishes {
+        place: place.at,
+        region,
+        ..SeriesWishes::default()
     })
 }
 
-fn series(
-    product: &ProductId,
-    region: Option<AskedRegion>,
-    place: &Place,
-    [from, to]: [Option<TimeMs>; 2],
-    earth: Earth,
-) -> Result<SeriesQuery> {
-    let product = product.clone();
-    Ok(match (region, place.at) {
-        (Some(region), None) => SeriesQuery::Region(RegionSeriesQuery {
-            from,
-            to,
-            earth,
-            ..RegionSeriesQuery::new(product, region)
-        }),
-        (None, Some(place)) => SeriesQuery::Cell {
-            product,
-            place,
-            from,
-            to,
-        },
-        _ => bail!("give a region or a place: --region or --at"),
-    })
+/// The series of a product that is asked for.
+pub(crate) fn series(wishes: SeriesWishes, product: &ProductId) -> Result<SeriesQuery> {
+    let query = wishes.query(product.clone());
+    query.context("give a region or a place: --region or --at")
 }

@@ -7,6 +7,7 @@ use anyhow::{Result, bail};
 use contract::event::{Body, Event};
 use contract::job::{Mode, RenderJob, View};
 use contract::key::ObjectKey;
+use contract::kind::Kind;
 use contract::tile::Tile;
 use contract::topic::Topic;
 use render_worker::desk::{Order, Origin, Storing};
@@ -52,7 +53,8 @@ pub(super) async fn plan(store: &Store, options: &Recompute) -> Result<Tiles> {
         northward: None,
         manifest: manifest.into(),
     };
-    let mut stored: BTreeSet<ObjectKey> = store.list("tiles").await?.into_iter().collect();
+    let mut stored: BTreeSet<ObjectKey> =
+        store.list(Kind::Tile.folder()).await?.into_iter().collect();
     if options.verify {
         let damaged = verify::damaged(store, stored.iter().cloned()).await?;
         stored.retain(|tile| !damaged.contains(tile));

@@ -14,13 +14,15 @@ fn series(values: &[Option<f64>]) -> PointSeries {
         }
     };
     PointSeries {
-        product: "sst".parse().unwrap(),
-        manifest: "sst@1-00000000".parse().unwrap(),
-        title: "Sea <b>& sky".to_owned(),
-        source: "made by a test".to_owned(),
-        synthetic: true,
-        quantity: contract::quantity::Quantity::SeaSurfaceTemperature,
-        unit: "°C".to_owned(),
+        cited: Cited {
+            product: "sst".parse().unwrap(),
+            manifest: "sst@1-00000000".parse().unwrap(),
+            title: "Sea <b>& sky".to_owned(),
+            source: "made by a test".to_owned(),
+            synthetic: true,
+            quantity: contract::quantity::Quantity::SeaSurfaceTemperature,
+            unit: "°C".to_owned(),
+        },
         lon_deg: 0.0,
         lat_deg: 0.0,
         cell: contract::series::Cell {

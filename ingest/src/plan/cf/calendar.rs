@@ -34,12 +34,12 @@ pub(crate) struct CalendarDate {
 /// A unit of a time axis: step and reference date.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct TimeUnit {
-    step: Step,
+    step: CalendarStep,
     reference: CalendarDate,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Step {
+enum CalendarStep {
     Seconds(f64),
     Months(i32),
 }
@@ -133,14 +133,14 @@ impl TimeUnit {
         let lower = text.trim().to_ascii_lowercase();
         let (step, date) = lower.split_once(" since ").ok_or_else(bad)?;
         let step = match step.trim() {
-            "seconds" | "second" | "sec" | "secs" | "s" => Step::Seconds(1.0),
-            "milliseconds" | "millisecond" | "msec" | "ms" => Step::Seconds(1e-3),
-            "minutes" | "minute" | "min" | "mins" => Step::Seconds(60.0),
-            "hours" | "hour" | "hr" | "hrs" | "h" => Step::Seconds(3600.0),
-            "days" | "day" | "d" => Step::Seconds(DAY_S),
-            "weeks" | "week" => Step::Seconds(7.0 * DAY_S),
-            "months" | "month" => Step::Months(1),
-            "years" | "year" | "common_years" | "common_year" => Step::Months(12),
+            "seconds" | "second" | "sec" | "secs" | "s" => CalendarStep::Seconds(1.0),
+            "milliseconds" | "millisecond" | "msec" | "ms" => CalendarStep::Seconds(1e-3),
+            "minutes" | "minute" | "min" | "mins" => CalendarStep::Seconds(60.0),
+            "hours" | "hour" | "hr" | "hrs" | "h" => CalendarStep::Seconds(3600.0),
+            "days" | "day" | "d" => CalendarStep::Seconds(DAY_S),
+            "weeks" | "week" => CalendarStep::Seconds(7.0 * DAY_S),
+            "months" | "month" => CalendarStep::Months(1),
+            "years" | "year" | "common_years" | "common_year" => CalendarStep::Months(12),
             _ => return Err(bad()),
         };
         let reference = parse_reference(date.trim(), calendar).ok_or_else(bad)?;
@@ -162,7 +162,7 @@ impl TimeUnit {
             calendar,
         } = self.reference;
         match self.step {
-            Step::Seconds(step_s) => {
+            CalendarStep::Seconds(step_s) => {
                 let total_s = number * step_s + second;
                 let days = (total_s / DAY_S).floor();
                 if !days.is_finite() || days.abs() > MAX_DAYS {
@@ -174,7 +174,7 @@ impl TimeUnit {
                     .ok_or_else(bad)
             }
             // Calendar months and years, as people who write them mean it; UDUNITS would take 30.44 days.
-            Step::Months(per_step) => {
+            CalendarStep::Months(per_step) => {
                 if !(number.is_finite() && number.abs() < 120_000.0) {
                     return Err(bad());
                 }

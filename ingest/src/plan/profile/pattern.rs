@@ -18,11 +18,11 @@ enum Piece {
     Literal(u8),
     AnyText,
     AnyByte,
-    Number(Field),
+    Number(PatternField),
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Field {
+enum PatternField {
     Year,
     Month,
     Day,
@@ -30,7 +30,7 @@ enum Field {
     Hour,
 }
 
-impl Field {
+impl PatternField {
     const ALL: [(&str, Self, usize); 5] = [
         ("{year}", Self::Year, 4),
         ("{month}", Self::Month, 2),
@@ -51,7 +51,9 @@ impl Field {
 pub(crate) fn check(pattern: &str, knows_year: bool) -> Result<(), String> {
     let pieces = pieces(pattern)?;
     let has = |field| pieces.contains(&Piece::Number(field));
-    if (knows_year || has(Field::Year)) && (has(Field::Month) || has(Field::DayOfYear)) {
+    if (knows_year || has(PatternField::Year))
+        && (has(PatternField::Month) || has(PatternField::DayOfYear))
+    {
         Ok(())
     } else {
         Err(format!(
@@ -77,7 +79,7 @@ fn pieces(pattern: &str) -> Result<Vec<Piece>, String> {
     let mut rest = pattern;
     let mut pieces = Vec::new();
     while let Some(first) = rest.bytes().next() {
-        let field = Field::ALL
+        let field = PatternField::ALL
             .iter()
             .find(|(text, _, _)| rest.starts_with(text));
         let (piece, len) = match (first, field) {
@@ -135,22 +137,22 @@ fn find(pieces: &[Piece], name: &str) -> Option<Found> {
     }
 }
 
-fn number(bytes: &[u8], at: usize, field: Field, found: &mut Found) -> Option<usize> {
+fn number(bytes: &[u8], at: usize, field: PatternField, found: &mut Found) -> Option<usize> {
     let len = field.digits();
     let digits = bytes.get(at..at + len)?;
     let value = digits.iter().try_fold(0, |n, b| {
         b.is_ascii_digit().then(|| n * 10 + u32::from(b - b'0'))
     })?;
     let slot = match field {
-        Field::Year => &mut found.year,
-        Field::Month if !(1..=12).contains(&value) => return None,
-        Field::Month => &mut found.month,
-        Field::Day if !(1..=31).contains(&value) => return None,
-        Field::Day => &mut found.day,
-        Field::DayOfYear if !(1..=366).contains(&value) => return None,
-        Field::DayOfYear => &mut found.day_of_year,
-        Field::Hour if value > 23 => return None,
-        Field::Hour => &mut found.hour,
+        PatternField::Year => &mut found.year,
+        PatternField::Month if !(1..=12).contains(&value) => return None,
+        PatternField::Month => &mut found.month,
+        PatternField::Day if !(1..=31).contains(&value) => return None,
+        PatternField::Day => &mut found.day,
+        PatternField::DayOfYear if !(1..=366).contains(&value) => return None,
+        PatternField::DayOfYear => &mut found.day_of_year,
+        PatternField::Hour if value > 23 => return None,
+        PatternField::Hour => &mut found.hour,
     };
     *slot = Some(value);
     Some(len)

@@ -1,0 +1,234 @@
+//! What is asked of series, from options to questions: the same for a command line and an address. What is absent is as usual.
+
+use std::sync::Arc;
+
+use super::{
+    Along, AnalysisOptions, AnalysisPart, BasePeriod, CalendarBins, CorrelationQuery,
+    HovmollerQuery, SeriesQuery,
+};
+use crate::ContractError;
+use crate::earth::Earth;
+use crate::grid::LonLatDeg;
+use crate::manifest::Manifest;
+use crate::product::ProductId;
+use crate::region::{AskedRegion, Region};
+use crate::series::RegionSeriesQuery;
+use crate::time::{TimeMs, TimeStep};
+
+/// Where a series is taken, and when.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct SeriesWishes {
+    /// In the cell that holds a place.
+    pub place: Option<LonLatDeg>,
+    /// As the mean over a region.
+    pub region: Option<AskedRegion>,
+    /// First instant.
+    pub from: Option<TimeMs>,
+    /// First instant after the asked period.
+    pub to: Option<TimeMs>,
+    /// Figure of the earth, in regions.
+    pub earth: Option<Earth>,
+    /// A version of a product that says how much of every cell is sea, in regions.
+    pub ocean: Option<Arc<Manifest>>,
+}
+
+impl SeriesWishes {
+    /// The series of a product; none where both or neither of a place and a region are given.
+    pub fn query(self, product: ProductId) -> Option<SeriesQuery> {
+        let (from, to) = (self.from, self.to);
+        match (self.place, self.region) {
+            (Some(place), None) => Some(SeriesQuery::Cell {
+                product,
+                place,
+                from,
+                to,
+            }),
+            (None, Some(region)) => Some(SeriesQuery::Region(RegionSeriesQuery {
+                from,
+                to,
+                earth: self.earth.unwrap_or_default(),
+                ocean: self.ocean,
+                ..RegionSeriesQuery::new(product, region)
+            })),
+            (Some(_), Some(_)) | (None, None) => None,
+        }
+    }
+}
+
+/// What is made of a series.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct AnalysisWishes {
+    /// What, in any order.
+    pub parts: Vec<AnalysisPart>,
+    /// Years of the climatology.
+    pub base: Option<BasePeriod>,
+    /// Parts of the year.
+    pub bins: Option<CalendarBins>,
+    /// Means that a trend is drawn through.
+    pub trend_step: Option<TimeStep>,
+}
+
+impl AnalysisWishes {
+    /// It with what is usual in place of what is absent.
+    ///
+    /// # Errors
+    /// No part at all.
+    pub fn options(self) -> Result<AnalysisOptions, ContractError> {
+        Ok(AnalysisOptions {
+            base: self.base,
+            bins: self.bins.unwrap_or_default(),
+            trend_step: self.trend_step.unwrap_or(AnalysisOptions::USUAL_STEP),
+            ..AnalysisOptions::new(self.parts)?
+        })
+    }
+}
+
+/// How two series are compared.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct CorrelationWishes {
+    /// What they are compared in.
+    pub step: Option<TimeStep>,
+    /// Is the mean of each calendar month taken off both first?
+    pub deseasonalise: Option<bool>,
+    /// Most steps that one is moved against the other.
+    pub max_lag: Option<u32>,
+}
+
+impl CorrelationWishes {
+    /// A series beside the same of another product.
+    ///
+    /// # Errors
+    /// A lag beyond 400 steps.
+    pub fn query(
+        self,
+        series: SeriesQuery,
+        with: ProductId,
+    ) -> Result<CorrelationQuery, ContractError> {
+        Ok(CorrelationQuery {
+            step: self.step.unwrap_or(AnalysisOptions::USUAL_STEP),
+            deseasonalise: self.deseasonalise.unwrap_or_default(),
+            ..CorrelationQuery::new(series, with, self.max_lag.unwrap_or_default())?
+        })
+    }
+}
+
+/// Years that are compared.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct DifferenceWishes {
+    /// Years of the first side; all that the series covers if absent.
+    pub period: Option<BasePeriod>,
+    /// Years of what is taken off; those of the first side if absent.
+    pub minus_period: Option<BasePeriod>,
+}
+
+impl DifferenceWishes {
+    /// Both sides: a series, and the same of the product that is taken off.
+    pub fn sides(self, all: &SeriesQuery, minus: ProductId) -> [SeriesQuery; 2] {
+        let minus_period = self.minus_period.or(self.period);
+        let minus = all.of_product(minus).in_years(minus_period);
+        [all.in_years(self.period), minus]
+    }
+}
+
+/// Bands and steps of a Hovmöller diagram.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct HovmollerWishes {
+    /// Height or width of a band, degrees.
+    pub band_deg: Option<f64>,
+    /// A box: cells whose middles lie in it.
+    pub region: Option<Region>,
+    /// What a row covers.
+    pub step: Option<TimeStep>,
+    /// First instant.
+    pub from: Option<TimeMs>,
+    /// First instant after the asked period.
+    pub to: Option<TimeMs>,
+    /// Figure of the earth.
+    pub earth: Option<Earth>,
+}
+
+impl HovmollerWishes {
+    /// Bands of a product that lie along latitude or longitude.
+    ///
+    /// # Errors
+    /// A region that is no box.
+    pub fn query(self, product: ProductId, along: Along) -> Result<HovmollerQuery, ContractError> {
+        let bounds_deg = self.region.map(|region| region.as_box()).transpose()?;
+        Ok(HovmollerQuery {
+            product,
+            along,
+            band_deg: self.band_deg,
+            bounds_deg: bounds_deg.flatten(),
+            step: self.step.unwrap_or(AnalysisOptions::USUAL_STEP),
+            from: self.from,
+            to: self.to,
+            earth: self.earth.unwrap_or_default(),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn series() -> SeriesQuery {
+        let wishes = SeriesWishes {
+            region: Some("global".parse().unwrap()),
+            ..SeriesWishes::default()
+        };
+        wishes.query("sst".parse().unwrap()).unwrap()
+    }
+
+    #[test]
+    fn a_series_is_of_a_place_or_of_a_region() {
+        let place = Some(LonLatDeg::new(1.0, 2.0).unwrap());
+        let region: Option<AskedRegion> = Some("global".parse().unwrap());
+        let of = |place, region| {
+            let wishes = SeriesWishes {
+                place,
+                region,
+                ..SeriesWishes::default()
+            };
+            wishes.query("sst".parse().unwrap())
+        };
+        assert!(matches!(of(place, None), Some(SeriesQuery::Cell { .. })));
+        assert!(matches!(
+            of(None, region.clone()),
+            Some(SeriesQuery::Region(_))
+        ));
+        assert_eq!((of(place, region), of(None, None)), (None, None));
+    }
+
+    #[test]
+    fn what_is_taken_off_is_of_the_same_years_unless_told() {
+        let years = |text: &str| -> Option<BasePeriod> { Some(text.parse().unwrap()) };
+        let first = |query: &SeriesQuery| query.window().0.unwrap().to_string();
+        let mut wishes = DifferenceWishes {
+            period: years("1991/1995"),
+            minus_period: None,
+        };
+        let [of, minus] = wishes.sides(&series(), "other".parse().unwrap());
+        assert_eq!(first(&of), first(&minus));
+        assert_eq!(minus.product().as_str(), "other");
+        wishes.minus_period = years("2001/2005");
+        let [of, minus] = wishes.sides(&series(), "sst".parse().unwrap());
+        assert_eq!(first(&of), "1991-01-01T00:00:00Z");
+        assert_eq!(first(&minus), "2001-01-01T00:00:00Z");
+    }
+
+    #[test]
+    fn what_is_absent_is_as_usual() {
+        let parts = vec![AnalysisPart::Trend];
+        let wishes = AnalysisWishes {
+            parts: parts.clone(),
+            ..AnalysisWishes::default()
+        };
+        assert_eq!(wishes.options(), AnalysisOptions::new(parts));
+        assert!(AnalysisWishes::default().options().is_err());
+        let with: ProductId = "ice".parse().unwrap();
+        let query = CorrelationWishes::default().query(series(), with.clone());
+        assert_eq!(query, CorrelationQuery::new(series(), with, 0));
+        let whole = HovmollerWishes::default().query("sst".parse().unwrap(), Along::Lat);
+        assert_eq!(whole.unwrap().bounds_deg, None);
+    }
+}
