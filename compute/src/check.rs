@@ -6,6 +6,7 @@ use contract::earth::Earth;
 use contract::product::ProductId;
 use contract::region::{Cells, NamedRegion};
 use contract::time::TimeStep;
+use futures::future::BoxFuture;
 use futures::future::{try_join, try_join_all};
 
 use crate::published::{ANNUAL, Annual, INTEGRALS};
@@ -46,15 +47,20 @@ fn against(stated: Stated, ours: f64) -> AgainstPaper {
 }
 
 /// Compares the budgets of a product that holds the Takahashi et al. (2009) fluxes with the published ones.
-pub async fn compare(engine: &Engine, product: &ProductId) -> Result<Vec<CheckRow>, ComputeError> {
-    let annual = try_join_all(
-        ANNUAL
-            .iter()
-            .map(|entry| annual_row(engine, product, entry)),
-    );
-    let (mut rows, months) = try_join(annual, monthly_rows(engine, product)).await?;
-    rows.extend(months);
-    Ok(rows)
+pub fn compare<'a>(
+    engine: &'a Engine,
+    product: &'a ProductId,
+) -> BoxFuture<'a, Result<Vec<CheckRow>, ComputeError>> {
+    Box::pin(async move {
+        let annual = try_join_all(
+            ANNUAL
+                .iter()
+                .map(|entry| annual_row(engine, product, entry)),
+        );
+        let (mut rows, months) = try_join(annual, monthly_rows(engine, product)).await?;
+        rows.extend(months);
+        Ok(rows)
+    })
 }
 
 async fn annual_row(

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use ballista::extension::SessionStateExt as _;
+use ballista_core::serde::protobuf::CancelJobParams;
 use ballista_core::serde::protobuf::scheduler_grpc_client::SchedulerGrpcClient;
 use ballista_core::utils::{GrpcClientConfig, create_grpc_client_endpoint};
 use datafusion::error::DataFusionError;
@@ -16,6 +17,9 @@ use crate::{ComputeError, Objects, state};
 
 /// How long a question is asked again while the cluster is away.
 pub const RETRY_LIMIT: Duration = Duration::from_mins(2);
+/// How long a cluster may take for one query unless told otherwise: no executor has been there, none has room for it, or its
+/// scheduler hangs.
+pub const QUERY_LIMIT: Duration = Duration::from_hours(1);
 /// The port of a scheduler that is named without one.
 const DEFAULT_PORT: u16 = 50050;
 /// A scheduler that does not answer within this is not there.
@@ -38,13 +42,30 @@ impl SchedulerUrl {
             .map_err(|e| ComputeError::cluster("reaching the scheduler")(e.into()))
     }
 
-    /// Does a scheduler answer there?
-    pub(crate) async fn answers(&self) -> Result<(), ComputeError> {
+    async fn connect(
+        &self,
+    ) -> Result<SchedulerGrpcClient<tonic::transport::Channel>, ComputeError> {
         let connected = self.endpoint()?.connect().await;
         let lost =
             |e: tonic::transport::Error| ComputeError::cluster("reaching the scheduler")(e.into());
-        drop(SchedulerGrpcClient::new(connected.map_err(lost)?));
-        Ok(())
+        Ok(SchedulerGrpcClient::new(connected.map_err(lost)?))
+    }
+
+    /// Does a scheduler answer there?
+    pub(crate) async fn answers(&self) -> Result<(), ComputeError> {
+        self.connect().await.map(drop)
+    }
+
+    /// Has the scheduler give out no more tasks of a job.
+    pub(crate) async fn cancel(&self, job: &str) -> Result<(), ComputeError> {
+        let job_id = job.to_owned();
+        let asked = self
+            .connect()
+            .await?
+            .cancel_job(CancelJobParams { job_id })
+            .await;
+        let failed = |e: tonic::Status| ComputeError::cluster("cancelling a query")(e.into());
+        asked.map(drop).map_err(failed)
     }
 }
 
@@ -100,6 +121,7 @@ impl std::str::FromStr for SchedulerUrl {
 pub(crate) struct Cluster {
     pub(crate) scheduler: SchedulerUrl,
     pub(crate) retry_limit: Duration,
+    pub(crate) query_limit: Duration,
 }
 
 impl Cluster {

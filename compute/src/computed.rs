@@ -19,6 +19,7 @@ use contract::digest::Digest;
 use contract::manifest::{MANIFEST_SCHEMA, Manifest, Step};
 use contract::masked::MaskedCells;
 use contract::product::ProductId;
+use futures::future::BoxFuture;
 use storage::{StorageError, domain, manifests};
 
 use crate::expression::unit::Unit;
@@ -56,63 +57,70 @@ pub struct Outcome {
 ///
 /// # Errors
 /// [`ComputeError::Expression`] where it makes no sense as it is asked for: mixed units, other grids, no common period.
-pub async fn compute(
-    engine: &Engine,
-    request: &Request,
-    progress: &(dyn Fn(DeriveProgress) + Send + Sync),
-) -> Result<Outcome, ComputeError> {
-    let plan = Plan::of(engine, request).await?;
-    let latest = manifests::latest(engine.store(), &request.target).await?;
-    if let Some(latest) = &latest {
-        fits_what_is_there(latest, &plan.job)?;
-    }
-    let kept = kept(&plan, latest.as_ref());
-    if let Some(latest) = latest.filter(|it| plan.is_what_is_there(request, it, &kept)) {
-        cube::keep_up(engine.store(), &latest).await;
-        return Ok(Outcome {
-            kept_count: latest.steps.len(),
-            left_out: plan.matches.left_out,
-            outside: BTreeMap::new(),
-            manifest: latest,
-        });
-    }
-    let (kept_count, left_out) = (kept.len(), plan.matches.left_out);
-    let (steps, outside) = plan.fields(engine, kept, progress).await?;
-    let domain = plan.extent(engine, &steps).await?;
-    let manifest = plan.manifest(request, steps, domain);
-    Ok(Outcome {
-        manifest: commit(engine, manifest).await?,
-        kept_count,
-        left_out,
-        outside,
+pub fn compute<'a>(
+    engine: &'a Engine,
+    request: &'a Request,
+    progress: &'a (dyn Fn(DeriveProgress) + Send + Sync),
+) -> BoxFuture<'a, Result<Outcome, ComputeError>> {
+    Box::pin(async move {
+        let plan = Plan::of(engine, request).await?;
+        let latest = manifests::latest(engine.store(), &request.target).await?;
+        if let Some(latest) = &latest {
+            fits_what_is_there(latest, &plan.job)?;
+        }
+        let kept = kept(&plan, latest.as_ref());
+        if let Some(latest) = latest.filter(|it| plan.is_what_is_there(request, it, &kept)) {
+            cube::keep_up(engine.store(), &latest).await;
+            return Ok(Outcome {
+                kept_count: latest.steps.len(),
+                left_out: plan.matches.left_out,
+                outside: BTreeMap::new(),
+                manifest: latest,
+            });
+        }
+        let (kept_count, left_out) = (kept.len(), plan.matches.left_out);
+        let (steps, outside) = plan.fields(engine, kept, progress).await?;
+        let domain = plan.extent(engine, &steps).await?;
+        let manifest = plan.manifest(request, steps, domain);
+        Ok(Outcome {
+            manifest: commit(engine, manifest).await?,
+            kept_count,
+            left_out,
+            outside,
+        })
     })
 }
 
 /// Brings every product up to date that was computed from one, and whatever was computed from those; their versions, each
 /// after those it was computed from. One that cannot be any more (its inputs have parted) is told of and left as it is.
-pub async fn follow(engine: &Engine, product: &ProductId) -> Result<Vec<Manifest>, ComputeError> {
-    let mut seen = BTreeSet::from([product.clone()]);
-    let mut open = VecDeque::from([product.clone()]);
-    let mut made = vec![];
-    while let Some(source) = open.pop_front() {
-        for request in dependents::of(engine.store(), &source).await? {
-            if !seen.insert(request.target.clone()) {
-                continue;
-            }
-            match compute(engine, &request, &|_progress| ()).await {
-                Ok(outcome) => {
-                    open.push_back(request.target);
-                    made.push(outcome.manifest);
+pub fn follow<'a>(
+    engine: &'a Engine,
+    product: &'a ProductId,
+) -> BoxFuture<'a, Result<Vec<Manifest>, ComputeError>> {
+    Box::pin(async move {
+        let mut seen = BTreeSet::from([product.clone()]);
+        let mut open = VecDeque::from([product.clone()]);
+        let mut made = vec![];
+        while let Some(source) = open.pop_front() {
+            for request in dependents::of(engine.store(), &source).await? {
+                if !seen.insert(request.target.clone()) {
+                    continue;
                 }
-                Err(error) if error.is_retryable() => return Err(error),
-                Err(error) => {
-                    let product = request.target;
-                    tracing::error!(%product, %error, "cannot be computed again");
+                match compute(engine, &request, &|_progress| ()).await {
+                    Ok(outcome) => {
+                        open.push_back(request.target);
+                        made.push(outcome.manifest);
+                    }
+                    Err(error) if error.is_retryable() => return Err(error),
+                    Err(error) => {
+                        let product = request.target;
+                        tracing::error!(%product, %error, "cannot be computed again");
+                    }
                 }
             }
         }
-    }
-    Ok(made)
+        Ok(made)
+    })
 }
 
 /// Everything that is known before the first value is read.

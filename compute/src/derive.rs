@@ -15,6 +15,7 @@ use contract::manifest::Manifest;
 use contract::product::ProductId;
 use contract::quantity::Quantity;
 use contract::time::{Period, TimeMs};
+use futures::future::BoxFuture;
 use storage::{StorageError, Store, manifests};
 
 use crate::{ComputeError, Engine, catalogue};
@@ -44,44 +45,48 @@ pub type Progress<'a> = dyn Fn(DeriveProgress) + Send + Sync + 'a;
 /// If the newest version was derived from the same version of the source and the same start, it is returned as it is;
 /// else only the steps from the first changed one on are computed.
 /// [`derived`] is the event to tell of it, after the manifest.
-pub async fn derive_accumulated(
-    engine: &Engine,
-    product: &ProductId,
+pub fn derive_accumulated<'a>(
+    engine: &'a Engine,
+    product: &'a ProductId,
     start: Option<TimeMs>,
-    progress: &Progress<'_>,
-) -> Result<Manifest, ComputeError> {
-    let source = flux(engine.store(), product).await?;
-    let steps = steps_since(&source, start)?;
-    let latest = manifests::latest(engine.store(), &product.accumulated()?).await?;
-    if let Some(latest) = latest
-        .as_ref()
-        .filter(|latest| is_up_to_date(latest, &source, &steps))
-    {
-        progress(of_all(steps.len(), &steps));
-        // Whoever published it may have been killed before the cube followed.
-        cube::keep_up(engine.store(), latest).await;
-        return Ok(latest.clone());
-    }
-    derive(engine, &source, &steps, latest.as_ref(), progress).await
+    progress: &'a Progress<'a>,
+) -> BoxFuture<'a, Result<Manifest, ComputeError>> {
+    Box::pin(async move {
+        let source = flux(engine.store(), product).await?;
+        let steps = steps_since(&source, start)?;
+        let latest = manifests::latest(engine.store(), &product.accumulated()?).await?;
+        if let Some(latest) = latest
+            .as_ref()
+            .filter(|latest| is_up_to_date(latest, &source, &steps))
+        {
+            progress(of_all(steps.len(), &steps));
+            // Whoever published it may have been killed before the cube followed.
+            cube::keep_up(engine.store(), latest).await;
+            return Ok(latest.clone());
+        }
+        derive(engine, &source, &steps, latest.as_ref(), progress).await
+    })
 }
 
 /// The same with every step that ends after `from` computed anew, whatever is stored. If what comes out is what is
 /// stored, no new version is made of it.
-pub async fn derive_anew(
-    engine: &Engine,
-    product: &ProductId,
+pub fn derive_anew<'a>(
+    engine: &'a Engine,
+    product: &'a ProductId,
     start: Option<TimeMs>,
     from: TimeMs,
-    progress: &Progress<'_>,
-) -> Result<Manifest, ComputeError> {
-    let source = flux(engine.store(), product).await?;
-    let steps = steps_since(&source, start)?;
-    let latest = manifests::latest(engine.store(), &product.accumulated()?).await?;
-    let trusted = latest.map(|mut latest| {
-        latest.steps.retain(|step| step.period.end <= from);
-        latest
-    });
-    derive(engine, &source, &steps, trusted.as_ref(), progress).await
+    progress: &'a Progress<'a>,
+) -> BoxFuture<'a, Result<Manifest, ComputeError>> {
+    Box::pin(async move {
+        let source = flux(engine.store(), product).await?;
+        let steps = steps_since(&source, start)?;
+        let latest = manifests::latest(engine.store(), &product.accumulated()?).await?;
+        let trusted = latest.map(|mut latest| {
+            latest.steps.retain(|step| step.period.end <= from);
+            latest
+        });
+        derive(engine, &source, &steps, trusted.as_ref(), progress).await
+    })
 }
 
 async fn derive(
@@ -112,28 +117,30 @@ async fn flux(store: &Store, product: &ProductId) -> Result<Manifest, ComputeErr
 /// The start that somebody chose for a product's accumulated carbon; none if it begins with its source, or is not there.
 ///
 /// A chosen start is one that is not where the source began when it was derived from it.
-pub async fn chosen_start(
-    store: &Store,
-    product: &ProductId,
-) -> Result<Option<TimeMs>, ComputeError> {
-    let Some(latest) = manifests::latest(store, &product.accumulated()?).await? else {
-        return Ok(None);
-    };
-    let (Some(first), Some(source)) = (latest.steps.first(), &latest.derived_from) else {
-        return Ok(None);
-    };
-    let source = match manifests::load(store, source).await {
-        Ok(source) => source,
-        // That version is gone: nobody can tell any more.
-        Err(e) if e.is_not_found() => return Ok(None),
-        Err(e) => return Err(e.into()),
-    };
-    let start = first.period.start;
-    let is_own = source
-        .steps
-        .first()
-        .is_some_and(|step| step.period.start == start);
-    Ok((!is_own).then_some(start))
+pub fn chosen_start<'a>(
+    store: &'a Store,
+    product: &'a ProductId,
+) -> BoxFuture<'a, Result<Option<TimeMs>, ComputeError>> {
+    Box::pin(async move {
+        let Some(latest) = manifests::latest(store, &product.accumulated()?).await? else {
+            return Ok(None);
+        };
+        let (Some(first), Some(source)) = (latest.steps.first(), &latest.derived_from) else {
+            return Ok(None);
+        };
+        let source = match manifests::load(store, source).await {
+            Ok(source) => source,
+            // That version is gone: nobody can tell any more.
+            Err(e) if e.is_not_found() => return Ok(None),
+            Err(e) => return Err(e.into()),
+        };
+        let start = first.period.start;
+        let is_own = source
+            .steps
+            .first()
+            .is_some_and(|step| step.period.start == start);
+        Ok((!is_own).then_some(start))
+    })
 }
 
 /// Every step of a product's accumulated carbon and the hash of what it would be made of now.

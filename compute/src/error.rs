@@ -125,9 +125,12 @@ pub enum ComputeError {
     },
     /// The cluster took a query and did not answer it.
     #[error(
-        "the cluster gave no answer within {limit_s} s; are there executors, and have they room?"
+        "the cluster of {scheduler} gave no answer within {limit_s} s: it has no executor with room for the query, or its scheduler \
+         hangs; see its /readyz, or allow more time (--cluster-limit-s)"
     )]
     Overdue {
+        /// Address of its scheduler.
+        scheduler: String,
         /// How long it was waited for, s.
         limit_s: u64,
     },

@@ -15,6 +15,7 @@ use std::sync::Arc;
 use datafusion::logical_expr::async_udf::AsyncScalarUDF;
 use datafusion::logical_expr::{AggregateUDF, ScalarUDF};
 
+pub(crate) use accumulate::NAME as ACCUMULATE;
 pub(crate) use computed::{FIELD as COMPUTED_FIELD, SERIES as COMPUTED_EXTENT};
 
 use crate::Objects;

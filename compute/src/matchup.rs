@@ -13,6 +13,7 @@ use contract::manifest::{Manifest, ManifestId};
 use contract::observation::Observation;
 use contract::product::ProductId;
 use contract::time::TimeMs;
+use futures::future::BoxFuture;
 use serde::{Deserialize, Serialize};
 use storage::{Store, fields};
 
@@ -99,62 +100,64 @@ pub struct Matchup {
 ///
 /// # Errors
 /// Observations of several properties, or in another unit than the product's; a store that does not answer.
-pub async fn matchup(
-    store: &Store,
-    manifest: &Manifest,
-    observations: &[Observation],
+pub fn matchup<'a>(
+    store: &'a Store,
+    manifest: &'a Manifest,
+    observations: &'a [Observation],
     time_match: TimeMatch,
-) -> Result<Matchup, ComputeError> {
-    let property = one_property(manifest, observations)?;
-    let Pairing {
-        mut pairs,
-        left_out: mut out,
-    } = pair::all(manifest, observations, time_match);
-    // Each field is read once, however many observations fall into it.
-    for (step, step_of_manifest) in manifest.steps.iter().enumerate() {
-        let is_needed = |pair: &Pair| pair.shares.iter().any(|share| share.step == step);
-        if !pairs.iter().any(is_needed) {
-            continue;
+) -> BoxFuture<'a, Result<Matchup, ComputeError>> {
+    Box::pin(async move {
+        let property = one_property(manifest, observations)?;
+        let Pairing {
+            mut pairs,
+            left_out: mut out,
+        } = pair::all(manifest, observations, time_match);
+        // Each field is read once, however many observations fall into it.
+        for (step, step_of_manifest) in manifest.steps.iter().enumerate() {
+            let is_needed = |pair: &Pair| pair.shares.iter().any(|share| share.step == step);
+            if !pairs.iter().any(is_needed) {
+                continue;
+            }
+            let values = fields::read(store, &step_of_manifest.field, &manifest.grid).await?;
+            for pair in &mut pairs {
+                pair.add(step, &values);
+            }
         }
-        let values = fields::read(store, &step_of_manifest.field, &manifest.grid).await?;
-        for pair in &mut pairs {
-            pair.add(step, &values);
-        }
-    }
-    let display = manifest.quantity.display();
-    let shown = |stored: f64| stored * display.factor + display.offset;
-    let all = pairs.len();
-    let with_data = pairs.into_iter().filter(|pair| !pair.gridded.is_nan());
-    let row = |pair: Pair| {
-        let observation = &observations[pair.observation];
-        MatchRow {
-            dataset: observation.dataset.clone(),
-            platform: observation.platform.clone(),
-            time: observation.time,
-            lon_deg: observation.lon_deg,
-            lat_deg: observation.lat_deg,
-            depth_m: observation.depth_m,
-            observed: shown(observation.value),
-            gridded: shown(pair.gridded),
-            distance_km: pair.distance_km,
-            hours: pair.hours,
-        }
-    };
-    let rows: Vec<MatchRow> = with_data.map(row).collect();
-    out.no_data += (all - rows.len()) as u64;
-    let values = rows.iter().map(|row| (row.observed, row.gridded));
-    Ok(Matchup {
-        product: manifest.product.clone(),
-        manifest: manifest.id(),
-        title: manifest.title.clone(),
-        source: manifest.source.clone(),
-        synthetic: manifest.synthetic,
-        property,
-        unit: display.unit.to_owned(),
-        time_match,
-        statistics: Statistics::of(&values),
-        left_out: out,
-        rows,
+        let display = manifest.quantity.display();
+        let shown = |stored: f64| stored * display.factor + display.offset;
+        let all = pairs.len();
+        let with_data = pairs.into_iter().filter(|pair| !pair.gridded.is_nan());
+        let row = |pair: Pair| {
+            let observation = &observations[pair.observation];
+            MatchRow {
+                dataset: observation.dataset.clone(),
+                platform: observation.platform.clone(),
+                time: observation.time,
+                lon_deg: observation.lon_deg,
+                lat_deg: observation.lat_deg,
+                depth_m: observation.depth_m,
+                observed: shown(observation.value),
+                gridded: shown(pair.gridded),
+                distance_km: pair.distance_km,
+                hours: pair.hours,
+            }
+        };
+        let rows: Vec<MatchRow> = with_data.map(row).collect();
+        out.no_data += (all - rows.len()) as u64;
+        let values = rows.iter().map(|row| (row.observed, row.gridded));
+        Ok(Matchup {
+            product: manifest.product.clone(),
+            manifest: manifest.id(),
+            title: manifest.title.clone(),
+            source: manifest.source.clone(),
+            synthetic: manifest.synthetic,
+            property,
+            unit: display.unit.to_owned(),
+            time_match,
+            statistics: Statistics::of(&values),
+            left_out: out,
+            rows,
+        })
     })
 }
 

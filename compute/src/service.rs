@@ -5,6 +5,7 @@
 //! what is stored is named by its content, so that doing it twice changes nothing.
 
 mod background;
+mod dealing;
 pub mod deriver;
 pub mod executor;
 mod executor_metrics;

@@ -9,21 +9,26 @@ use std::time::Duration;
 use ballista::extension::SessionConfigExt as _;
 use contract::digest::Digest;
 use contract::manifest::{Manifest, ManifestId};
+use datafusion::arrow::array::RecordBatch;
 use datafusion::catalog::MemoryCatalogProviderList;
 use datafusion::error::DataFusionError;
+use datafusion::execution::SendableRecordBatchStream;
 use datafusion::execution::context::SessionContext;
 use datafusion::execution::session_state::{SessionState, SessionStateBuilder};
+use datafusion::physical_plan::execute_stream;
+use datafusion::prelude::DataFrame;
+use futures::TryStreamExt as _;
+use futures::future::BoxFuture;
 use retry::Backoff;
 use storage::Store;
 use tokio::sync::OnceCell;
+use tokio::time::Instant;
 
 use crate::cluster::{self, Cluster, SchedulerUrl};
+use crate::cluster_job::AwaitedJob;
 use crate::open_versions::OpenVersions;
 use crate::standalone::{self, WorkFolder, WorkLease};
 use crate::{ComputeError, Objects, state};
-
-/// A query that a cluster does not answer within this is given up: no executor has been there, or none has room for it.
-const QUERY_LIMIT: Duration = Duration::from_hours(1);
 
 /// A query engine over one store; clones share it. It starts with its first query.
 #[derive(Clone)]
@@ -54,8 +59,34 @@ struct Session {
 /// A context for one query: the shared session, tables of its own, and a claim on intermediate files.
 pub(crate) struct QueryContext {
     context: SessionContext,
+    /// Whose job the query is; none of an engine in this process.
+    scheduler: Option<SchedulerUrl>,
     /// Dropped with the context: the files of a query outlive its last batch.
     _lease: Option<WorkLease>,
+}
+
+impl QueryContext {
+    /// Batches of a query as they come. A cluster's job is cancelled where they are dropped before their end.
+    pub(crate) async fn stream(
+        &self,
+        query: DataFrame,
+    ) -> Result<SendableRecordBatchStream, DataFusionError> {
+        let tasks = Arc::new(query.task_ctx());
+        let plan = query.create_physical_plan().await?;
+        let batches = execute_stream(Arc::clone(&plan), tasks)?;
+        Ok(match &self.scheduler {
+            None => batches,
+            Some(scheduler) => Box::pin(AwaitedJob::new(batches, plan, scheduler.clone())),
+        })
+    }
+
+    /// All batches of a query.
+    pub(crate) async fn collect(
+        &self,
+        query: DataFrame,
+    ) -> Result<Vec<RecordBatch>, DataFusionError> {
+        self.stream(query).await?.try_collect().await
+    }
 }
 
 impl std::ops::Deref for QueryContext {
@@ -102,6 +133,7 @@ impl Engine {
         let cluster = Cluster {
             scheduler,
             retry_limit: cluster::RETRY_LIMIT,
+            query_limit: cluster::QUERY_LIMIT,
         };
         Self::new(store, Kind::Cluster(cluster), partitions)
     }
@@ -109,16 +141,25 @@ impl Engine {
     /// The same engine, waiting so long for a cluster that is away; other engines have nobody to wait for.
     #[must_use]
     pub fn with_retry_limit(&self, retry_limit: Duration) -> Self {
+        self.with_cluster(|cluster| cluster.retry_limit = retry_limit)
+    }
+
+    /// The same engine, giving a query up that its cluster does not answer within so long, tries to ask again among it;
+    /// other engines work themselves.
+    #[must_use]
+    pub fn with_query_limit(&self, query_limit: Duration) -> Self {
+        self.with_cluster(|cluster| cluster.query_limit = query_limit)
+    }
+
+    fn with_cluster(&self, change: impl FnOnce(&mut Cluster)) -> Self {
         let Kind::Cluster(cluster) = &self.inner.kind else {
             return self.clone();
         };
-        let kind = Kind::Cluster(Cluster {
-            retry_limit,
-            ..cluster.clone()
-        });
+        let mut cluster = cluster.clone();
+        change(&mut cluster);
         let inner = &self.inner;
         self.with(Inner {
-            kind,
+            kind: Kind::Cluster(cluster),
             session: OnceCell::new(),
             store: inner.store.clone(),
             objects: inner.objects.clone(),
@@ -203,13 +244,15 @@ impl Engine {
     ///
     /// # Errors
     /// A store that does not answer; a cube that cannot be read.
-    pub async fn values(
-        &self,
-        manifest: &Manifest,
-        id: &ManifestId,
-    ) -> Result<cube::Values, ComputeError> {
-        let opened = self.open_versions.values(self.store(), manifest, id);
-        Ok(opened.await?)
+    pub fn values<'a>(
+        &'a self,
+        manifest: &'a Manifest,
+        id: &'a ManifestId,
+    ) -> BoxFuture<'a, Result<cube::Values, ComputeError>> {
+        Box::pin(async move {
+            let opened = self.open_versions.values(self.store(), manifest, id);
+            Ok(opened.await?)
+        })
     }
 
     /// Lets go of a version's values; false if they were not held.
@@ -232,17 +275,24 @@ impl Engine {
         !matches!(self.inner.kind, Kind::Local)
     }
 
+    /// Does whoever plans its queries deal the pieces of a question out to executors?
+    pub(crate) fn has_dealer(&self) -> bool {
+        matches!(self.inner.kind, Kind::Cluster(_))
+    }
+
     /// Starts the engine if it has not started; queries do so by themselves.
-    pub async fn start(&self) -> Result<(), ComputeError> {
-        self.session().await.map(|_session| ())
+    pub fn start(&self) -> BoxFuture<'_, Result<(), ComputeError>> {
+        Box::pin(async move { self.session().await.map(|_session| ()) })
     }
 
     /// Can a query be asked now? Of a cluster its scheduler is asked, within two seconds.
-    pub async fn ready(&self) -> Result<(), ComputeError> {
-        match &self.inner.kind {
-            Kind::Cluster(cluster) => cluster.scheduler.answers().await,
-            Kind::Standalone | Kind::Local => Ok(()),
-        }
+    pub fn ready(&self) -> BoxFuture<'_, Result<(), ComputeError>> {
+        Box::pin(async move {
+            match &self.inner.kind {
+                Kind::Cluster(cluster) => cluster.scheduler.answers().await,
+                Kind::Standalone | Kind::Local => Ok(()),
+            }
+        })
     }
 
     /// Works on a question; `job` is the hash of all that its answer depends on.
@@ -258,14 +308,16 @@ impl Engine {
             return ask(self.context(&name).await?).await;
         };
         let mut pauses = Backoff::within(cluster.retry_limit).pauses();
+        let end = Instant::now() + cluster.query_limit;
         loop {
             let asked = ask(self.context(&name).await?);
-            let error = match tokio::time::timeout(QUERY_LIMIT, asked).await {
+            let error = match tokio::time::timeout_at(end, asked).await {
                 Ok(Err(error)) if error.is_retryable() => error,
                 Ok(ended) => return ended,
                 Err(_elapsed) => {
                     return Err(ComputeError::Overdue {
-                        limit_s: QUERY_LIMIT.as_secs(),
+                        scheduler: cluster.scheduler.to_string(),
+                        limit_s: cluster.query_limit.as_secs(),
                     });
                 }
             };
@@ -300,8 +352,13 @@ impl Engine {
             Some(work) => Some(work.lease().await),
             None => None,
         };
+        let scheduler = match &self.inner.kind {
+            Kind::Cluster(cluster) => Some(cluster.scheduler.clone()),
+            Kind::Standalone | Kind::Local => None,
+        };
         Ok(QueryContext {
             context: SessionContext::new_with_state(state),
+            scheduler,
             _lease: lease,
         })
     }

@@ -9,6 +9,7 @@ use std::time::Duration;
 use chrono::{DateTime, TimeDelta, Utc};
 use contract::product::ProductId;
 use contract::time::TimeMs;
+use futures::future::BoxFuture;
 use icechunk::format::SnapshotId;
 use icechunk::ops::gc::{ExpiredRefAction, GCConfig, expire, garbage_collect};
 use serde::Serialize;
@@ -53,39 +54,41 @@ impl Cleaned {
 ///
 /// # Errors
 /// A store that does not answer; a cube that cannot be read, of which nothing is removed.
-pub async fn run(
+pub fn run(
     store: &Store,
     keep: Keep,
     now: TimeMs,
     is_dry_run: bool,
-) -> Result<Vec<Cleaned>, CubeError> {
-    let kept = Kept::read(store, keep.versions.max(1)).await?;
-    let age = keep.age.max(LEAST_AGE);
-    let mut all = vec![];
-    for product in verify::products(store).await? {
-        let numbers: BTreeSet<String> = kept
-            .manifests
-            .iter()
-            .filter(|manifest| manifest.product == product)
-            .map(|manifest| manifest.number.to_string())
-            .collect();
-        // A product that is there no more: somebody removed it by hand, and decides about its cube, too.
-        if numbers.is_empty() {
-            continue;
+) -> BoxFuture<'_, Result<Vec<Cleaned>, CubeError>> {
+    Box::pin(async move {
+        let kept = Kept::read(store, keep.versions.max(1)).await?;
+        let age = keep.age.max(LEAST_AGE);
+        let mut all = vec![];
+        for product in verify::products(store).await? {
+            let numbers: BTreeSet<String> = kept
+                .manifests
+                .iter()
+                .filter(|manifest| manifest.product == product)
+                .map(|manifest| manifest.number.to_string())
+                .collect();
+            // A product that is there no more: somebody removed it by hand, and decides about its cube, too.
+            if numbers.is_empty() {
+                continue;
+            }
+            let repository = Repository::open(store, &folder(&product)).await?;
+            let cutoff = older_than(now, age, &repository)?;
+            let versions = repository.cut_names(&numbers, cutoff, is_dry_run).await?;
+            let (objects_count, size_bytes) =
+                Box::pin(repository.remove_unused(cutoff, is_dry_run)).await?;
+            all.push(Cleaned {
+                product,
+                versions,
+                objects_count,
+                size_bytes,
+            });
         }
-        let repository = Repository::open(store, &folder(&product)).await?;
-        let cutoff = older_than(now, age, &repository)?;
-        let versions = repository.cut_names(&numbers, cutoff, is_dry_run).await?;
-        let (objects_count, size_bytes) =
-            Box::pin(repository.remove_unused(cutoff, is_dry_run)).await?;
-        all.push(Cleaned {
-            product,
-            versions,
-            objects_count,
-            size_bytes,
-        });
-    }
-    Ok(all)
+        Ok(all)
+    })
 }
 
 fn older_than(

@@ -9,6 +9,7 @@ use std::sync::Arc;
 use bytes::Bytes;
 use contract::chunk::Window;
 use contract::digest::Digest;
+use futures::future::BoxFuture;
 use futures::stream::{self, StreamExt as _, TryStreamExt as _};
 use icechunk::format::manifest::ChunkPayload;
 use icechunk::format::{ChunkIndices, Path};
@@ -47,25 +48,27 @@ struct Made {
 ///
 /// # Errors
 /// `Missing` if there is no cube. A chunk that is damaged or gone: no run is made of it.
-pub async fn compact(store: &Store, folder: &str) -> Result<usize, CubeError> {
-    let repository = Repository::open(store, folder).await?;
-    let mut made = 0;
-    loop {
-        let cube = repository.at(&At::Newest).await?;
-        let Some(run) = cube.first_missing() else {
-            return Ok(made);
-        };
-        let compaction = Compaction {
-            repository: &repository,
-            cube: &cube,
-            encoder: Arc::new(SeriesEncoder::new(cube.description())?),
-            basis: cube.sums().next_basis(cube.description()),
-            run,
-            has_series: cube.runs().is_of(run, cube.steps()),
-        };
-        let shards = compaction.shards().await?;
-        made += usize::from(compaction.place(&shards).await?);
-    }
+pub fn compact<'a>(store: &'a Store, folder: &'a str) -> BoxFuture<'a, Result<usize, CubeError>> {
+    Box::pin(async move {
+        let repository = Repository::open(store, folder).await?;
+        let mut made = 0;
+        loop {
+            let cube = repository.at(&At::Newest).await?;
+            let Some(run) = cube.first_missing() else {
+                return Ok(made);
+            };
+            let compaction = Compaction {
+                repository: &repository,
+                cube: &cube,
+                encoder: Arc::new(SeriesEncoder::new(cube.description())?),
+                basis: cube.sums().next_basis(cube.description()),
+                run,
+                has_series: cube.runs().is_of(run, cube.steps()),
+            };
+            let shards = compaction.shards().await?;
+            made += usize::from(compaction.place(&shards).await?);
+        }
+    })
 }
 
 struct Compaction<'a> {

@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use contract::time::Period;
+use futures::future::BoxFuture;
 use futures::stream::{StreamExt as _, TryStreamExt as _};
 use icechunk::format::manifest::ChunkPayload;
 use icechunk::format::{ChunkIndices, Path};
@@ -49,8 +50,8 @@ pub struct Committed {
 
 impl<'a> Edit<'a> {
     /// Begins a change: nothing of it is seen before its commit.
-    pub async fn begin(repository: &'a Repository) -> Result<Self, CubeError> {
-        Self::describing(repository, repository.description.clone()).await
+    pub fn begin(repository: &'a Repository) -> BoxFuture<'a, Result<Self, CubeError>> {
+        Box::pin(async move { Self::describing(repository, repository.description.clone()).await })
     }
 
     /// Begins a change after which the cube is of something else, or of another version of it.
@@ -72,19 +73,27 @@ impl<'a> Edit<'a> {
 
     /// Puts a step, in the place of one of the same period if there is one: `values` `[row, col]`, stored unit, NaN no data.
     /// They are in the store when this returns, and seen by nobody.
-    pub async fn put(&mut self, period: Period, values: Arc<[f32]>) -> Result<Step, CubeError> {
-        let (grid, own) = (self.description.grid, Arc::clone(&values));
-        plain::check_length(&values, grid.cell_count())?;
-        let digested =
-            tokio::task::spawn_blocking(move || storage::fields::digest_of(&grid, &own, period));
-        let digested = digested.await;
-        let step = Step {
-            period,
-            values_sha256: digested.map_err(|e| self.repository.failed("naming the values", &e))?,
-        };
-        let staged = self.send(step, &values).await?;
-        self.stage(staged);
-        Ok(step)
+    pub fn put(
+        &mut self,
+        period: Period,
+        values: Arc<[f32]>,
+    ) -> BoxFuture<'_, Result<Step, CubeError>> {
+        Box::pin(async move {
+            let (grid, own) = (self.description.grid, Arc::clone(&values));
+            plain::check_length(&values, grid.cell_count())?;
+            let digested = tokio::task::spawn_blocking(move || {
+                storage::fields::digest_of(&grid, &own, period)
+            });
+            let digested = digested.await;
+            let step = Step {
+                period,
+                values_sha256: digested
+                    .map_err(|e| self.repository.failed("naming the values", &e))?,
+            };
+            let staged = self.send(step, &values).await?;
+            self.stage(staged);
+            Ok(step)
+        })
     }
 
     /// Sends the values of a step whose digest is known. Several may be on the way at once.

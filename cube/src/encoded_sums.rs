@@ -4,6 +4,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use bytes::Bytes;
+use futures::future::BoxFuture;
 
 use crate::blocks::ChunkDecoder;
 use crate::record::{RECORD_BYTES, Record};
@@ -71,23 +72,25 @@ impl Values {
     ///
     /// # Errors
     /// A store that does not answer; a chunk that is damaged or gone, by its name.
-    pub async fn sums(
-        &self,
-        blocks: &[[u32; 2]],
+    pub fn sums<'a>(
+        &'a self,
+        blocks: &'a [[u32; 2]],
         steps: Range<usize>,
-    ) -> Result<Option<EncodedSums>, CubeError> {
-        let Some((cube, run, pieces)) = self.run_of(&steps) else {
-            return Ok(None);
-        };
-        if !cube.is_summed(run) {
-            return Ok(None);
-        }
-        Ok(Some(EncodedSums {
-            content: cube.records(run, blocks).await?,
-            cube,
-            run,
-            at: blocks.to_vec(),
-            pieces,
-        }))
+    ) -> BoxFuture<'a, Result<Option<EncodedSums>, CubeError>> {
+        Box::pin(async move {
+            let Some((cube, run, pieces)) = self.run_of(&steps) else {
+                return Ok(None);
+            };
+            if !cube.is_summed(run) {
+                return Ok(None);
+            }
+            Ok(Some(EncodedSums {
+                content: cube.records(run, blocks).await?,
+                cube,
+                run,
+                at: blocks.to_vec(),
+                pieces,
+            }))
+        })
     }
 }

@@ -14,6 +14,7 @@ use contract::kind::{Kind, Vouched};
 use contract::manifest::{Manifest, ManifestId};
 use contract::product::ProductId;
 use contract::time::Period;
+use futures::future::BoxFuture;
 use futures::stream::{self, StreamExt as _, TryStreamExt as _};
 use storage::{Store, fields, manifests};
 
@@ -49,14 +50,19 @@ pub fn folder(product: &ProductId) -> String {
 }
 
 /// Brings the cube of a product in its store to a version; see [`Follower::run`].
-pub async fn follow(store: &Store, manifest: &Manifest) -> Result<Followed, CubeError> {
-    let follower = Follower {
-        store,
-        folder: &folder(&manifest.product),
-        fields: store,
-        told: &|_period| (),
-    };
-    follower.run(manifest).await
+pub fn follow<'a>(
+    store: &'a Store,
+    manifest: &'a Manifest,
+) -> BoxFuture<'a, Result<Followed, CubeError>> {
+    Box::pin(async move {
+        let follower = Follower {
+            store,
+            folder: &folder(&manifest.product),
+            fields: store,
+            told: &|_period| (),
+        };
+        follower.run(manifest).await
+    })
 }
 
 /// The same for whoever has just published a version, or found that it was published before and not told of.
@@ -65,18 +71,20 @@ pub async fn follow(store: &Store, manifest: &Manifest) -> Result<Followed, Cube
 /// is no reason to fail a landing. The next version brings it up, and so does `fluxglobe recompute --verify`.
 ///
 /// Complete runs of steps are then made time-major, which nobody waits for but [`crate::compacted`].
-pub async fn keep_up(store: &Store, manifest: &Manifest) {
-    let (own, version) = (store.clone(), manifest.clone());
-    // A task of its own: a panic over a damaged cube ends there.
-    let followed = tokio::spawn(async move { follow(&own, &version).await });
-    let error = match followed.await {
-        Ok(Ok(_followed)) => {
-            return background::begin(store.clone(), folder(&manifest.product));
-        }
-        Ok(Err(error)) => error.to_string(),
-        Err(error) => error.to_string(),
-    };
-    tracing::warn!(version = %manifest.id(), %error, "the cube stays behind; its next version, or `fluxglobe recompute --product PRODUCT --verify`, brings it up");
+pub fn keep_up<'a>(store: &'a Store, manifest: &'a Manifest) -> BoxFuture<'a, ()> {
+    Box::pin(async move {
+        let (own, version) = (store.clone(), manifest.clone());
+        // A task of its own: a panic over a damaged cube ends there.
+        let followed = tokio::spawn(async move { follow(&own, &version).await });
+        let error = match followed.await {
+            Ok(Ok(_followed)) => {
+                return background::begin(store.clone(), folder(&manifest.product));
+            }
+            Ok(Err(error)) => error.to_string(),
+            Err(error) => error.to_string(),
+        };
+        tracing::warn!(version = %manifest.id(), %error, "the cube stays behind; its next version, or `fluxglobe recompute --product PRODUCT --verify`, brings it up");
+    })
 }
 
 /// Brings a cube to versions of a product.
@@ -106,42 +114,44 @@ impl Follower<'_> {
     ///
     /// # Errors
     /// `Foreign` if the cube is of another version of this number, or of another product. A field that cannot be read.
-    pub async fn run(&self, manifest: &Manifest) -> Result<Followed, CubeError> {
-        let version = manifest.id();
-        let description = Description::of(manifest);
-        let repository = Repository::for_change(self.store, self.folder, &description).await?;
-        let mut edit = Edit::describing(&repository, description.clone()).await?;
-        for _attempt in 0..ATTEMPTS {
-            let state = State::newest(&repository).await?;
-            if let Some(there) = self.settled(&repository, &state, &version).await? {
-                return Ok(Followed {
-                    version: there,
-                    put_count: edit.staged().len(),
-                });
+    pub fn run<'a>(&'a self, manifest: &'a Manifest) -> BoxFuture<'a, Result<Followed, CubeError>> {
+        Box::pin(async move {
+            let version = manifest.id();
+            let description = Description::of(manifest);
+            let repository = Repository::for_change(self.store, self.folder, &description).await?;
+            let mut edit = Edit::describing(&repository, description.clone()).await?;
+            for _attempt in 0..ATTEMPTS {
+                let state = State::newest(&repository).await?;
+                if let Some(there) = self.settled(&repository, &state, &version).await? {
+                    return Ok(Followed {
+                        version: there,
+                        put_count: edit.staged().len(),
+                    });
+                }
+                let before: &[Step] = if state.describes_same_cells(&description) {
+                    &state.steps
+                } else {
+                    &[]
+                };
+                let wanted = self.wanted(manifest, &state, before, &mut edit).await?;
+                let plan = Plan::exactly(&wanted, before, edit.staged());
+                let plan = plan.map_err(|missing| CubeError::Foreign {
+                    place: repository.place.clone(),
+                    array: "time".to_owned(),
+                    reason: format!("steps of {missing:?} are neither there nor put"),
+                })?;
+                let committed = edit.lay(&state, &plan, &version.to_string()).await?;
+                if let Some(snapshot) = committed {
+                    let tag = version.number.to_string();
+                    repository.tag(&tag, &snapshot).await?;
+                    return Ok(Followed {
+                        version,
+                        put_count: edit.staged().len(),
+                    });
+                }
             }
-            let before: &[Step] = if state.describes_same_cells(&description) {
-                &state.steps
-            } else {
-                &[]
-            };
-            let wanted = self.wanted(manifest, &state, before, &mut edit).await?;
-            let plan = Plan::exactly(&wanted, before, edit.staged());
-            let plan = plan.map_err(|missing| CubeError::Foreign {
-                place: repository.place.clone(),
-                array: "time".to_owned(),
-                reason: format!("steps of {missing:?} are neither there nor put"),
-            })?;
-            let committed = edit.lay(&state, &plan, &version.to_string()).await?;
-            if let Some(snapshot) = committed {
-                let tag = version.number.to_string();
-                repository.tag(&tag, &snapshot).await?;
-                return Ok(Followed {
-                    version,
-                    put_count: edit.staged().len(),
-                });
-            }
-        }
-        Err(edit.contended())
+            Err(edit.contended())
+        })
     }
 
     /// Names the state that is there, in case somebody was killed before that. The version it is of, if there is nothing

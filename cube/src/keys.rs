@@ -4,6 +4,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use bytes::Bytes;
+use futures::future::BoxFuture;
 use icechunk::Store as ZarrStore;
 use icechunk::format::{ByteRange, ChunkIndices, Path};
 use icechunk::session::Session;
@@ -32,37 +33,39 @@ impl Repository {
     ///
     /// # Errors
     /// As [`Repository::at`].
-    pub async fn keys(&self, at: &At) -> Result<Keys, CubeError> {
-        let cube = self.at(at).await?;
-        let session = cube.session();
-        let failed = |e: &dyn std::fmt::Display| self.failed("describing the arrays", e);
-        let own = session.read().await;
-        let nodes = own
-            .list_nodes(&Path::root())
-            .await
-            .map_err(|e| failed(&e))?;
-        let nodes: Result<Vec<_>, _> = nodes.collect();
-        let nodes = nodes.map_err(|e| failed(&e))?;
-        let (mut group, mut arrays) = (Value::Null, Map::new());
-        for node in nodes {
-            let metadata: Value =
-                serde_json::from_slice(&node.user_data).map_err(|e| failed(&e))?;
-            match node.path.to_string().trim_start_matches('/') {
-                "" => group = metadata,
-                name => drop(arrays.insert(name.to_owned(), metadata)),
+    pub fn keys<'a>(&'a self, at: &'a At) -> BoxFuture<'a, Result<Keys, CubeError>> {
+        Box::pin(async move {
+            let cube = self.at(at).await?;
+            let session = cube.session();
+            let failed = |e: &dyn std::fmt::Display| self.failed("describing the arrays", e);
+            let own = session.read().await;
+            let nodes = own
+                .list_nodes(&Path::root())
+                .await
+                .map_err(|e| failed(&e))?;
+            let nodes: Result<Vec<_>, _> = nodes.collect();
+            let nodes = nodes.map_err(|e| failed(&e))?;
+            let (mut group, mut arrays) = (Value::Null, Map::new());
+            for node in nodes {
+                let metadata: Value =
+                    serde_json::from_slice(&node.user_data).map_err(|e| failed(&e))?;
+                match node.path.to_string().trim_start_matches('/') {
+                    "" => group = metadata,
+                    name => drop(arrays.insert(name.to_owned(), metadata)),
+                }
             }
-        }
-        let snapshot = own.snapshot_id().to_string();
-        drop(own);
-        group["consolidated_metadata"] =
-            json!({ "kind": "inline", "must_understand": false, "metadata": arrays });
-        Ok(Keys {
-            description: cube.description().clone(),
-            store: ZarrStore::from_session(Arc::clone(&session)).await,
-            session,
-            snapshot,
-            consolidated: group.to_string().into(),
-            place: self.place().to_owned(),
+            let snapshot = own.snapshot_id().to_string();
+            drop(own);
+            group["consolidated_metadata"] =
+                json!({ "kind": "inline", "must_understand": false, "metadata": arrays });
+            Ok(Keys {
+                description: cube.description().clone(),
+                store: ZarrStore::from_session(Arc::clone(&session)).await,
+                session,
+                snapshot,
+                consolidated: group.to_string().into(),
+                place: self.place().to_owned(),
+            })
         })
     }
 }
@@ -79,29 +82,33 @@ impl Keys {
     }
 
     /// Length of the value of a key; none if there is no such key, or a chunk without data.
-    pub async fn length(&self, key: &str) -> Result<Option<u64>, CubeError> {
-        let Some((path, index)) = chunk_of(key) else {
-            let whole = self.read(key, &ByteRange::ALL).await?;
-            return Ok(whole.map(|whole| whole.len() as u64));
-        };
-        let session = self.session.read().await;
-        // An array that is not there, or has no such chunk.
-        let Ok(payload) = session.get_chunk_ref(&path, &index).await else {
-            return Ok(None);
-        };
-        Ok(payload.map(|payload| payload.length()))
+    pub fn length<'a>(&'a self, key: &'a str) -> BoxFuture<'a, Result<Option<u64>, CubeError>> {
+        Box::pin(async move {
+            let Some((path, index)) = chunk_of(key) else {
+                let whole = self.read(key, &ByteRange::ALL).await?;
+                return Ok(whole.map(|whole| whole.len() as u64));
+            };
+            let session = self.session.read().await;
+            // An array that is not there, or has no such chunk.
+            let Ok(payload) = session.get_chunk_ref(&path, &index).await else {
+                return Ok(None);
+            };
+            Ok(payload.map(|payload| payload.length()))
+        })
     }
 
     /// The value of a key, or those bytes of it; none if there is no such key, or a chunk without data.
     ///
     /// Chunks are as they are stored, with their checksums: who decodes them compares those.
-    pub async fn get(
-        &self,
-        key: &str,
+    pub fn get<'a>(
+        &'a self,
+        key: &'a str,
         range: Option<Range<u64>>,
-    ) -> Result<Option<Bytes>, CubeError> {
-        let range = range.map_or(ByteRange::ALL, ByteRange::Bounded);
-        self.read(key, &range).await
+    ) -> BoxFuture<'a, Result<Option<Bytes>, CubeError>> {
+        Box::pin(async move {
+            let range = range.map_or(ByteRange::ALL, ByteRange::Bounded);
+            self.read(key, &range).await
+        })
     }
 
     async fn read(&self, key: &str, range: &ByteRange) -> Result<Option<Bytes>, CubeError> {

@@ -7,6 +7,7 @@ use async_trait::async_trait;
 use bytes::Bytes;
 use contract::key::ObjectKey;
 use contract::time::Period;
+use futures::future::BoxFuture;
 use futures::stream::{self, StreamExt as _, TryStreamExt as _};
 use serde_json::{Value, json};
 use storage::Store;
@@ -100,24 +101,26 @@ impl PlainZarr {
     ///
     /// # Errors
     /// `Exists` if the folder is not empty.
-    pub async fn create(
-        store: &Store,
-        folder: &str,
-        description: &Description,
-    ) -> Result<Self, CubeError> {
-        if !store.list(folder).await?.is_empty() {
-            return Err(CubeError::Exists {
-                place: format!("{}{folder}", store.url()),
-            });
-        }
-        Ok(Self {
-            folder: Arc::new(Folder {
-                store: store.clone(),
-                name: folder.trim_matches('/').to_owned(),
-            }),
-            description: description.clone(),
-            encoder: Arc::new(Encoder::new(description)?),
-            steps: vec![],
+    pub fn create<'a>(
+        store: &'a Store,
+        folder: &'a str,
+        description: &'a Description,
+    ) -> BoxFuture<'a, Result<Self, CubeError>> {
+        Box::pin(async move {
+            if !store.list(folder).await?.is_empty() {
+                return Err(CubeError::Exists {
+                    place: format!("{}{folder}", store.url()),
+                });
+            }
+            Ok(Self {
+                folder: Arc::new(Folder {
+                    store: store.clone(),
+                    name: folder.trim_matches('/').to_owned(),
+                }),
+                description: description.clone(),
+                encoder: Arc::new(Encoder::new(description)?),
+                steps: vec![],
+            })
         })
     }
 
@@ -125,43 +128,49 @@ impl PlainZarr {
     ///
     /// # Errors
     /// `Overlap` if it does not come after the last one.
-    pub async fn append(&mut self, period: Period, values: Arc<[f32]>) -> Result<Step, CubeError> {
-        if let Some(last) = self.steps.last()
-            && period.start < last.period.end
-        {
-            return Err(CubeError::Overlap {
-                step: period,
-                there: last.period,
-            });
-        }
-        let grid = self.description.grid;
-        check_length(&values, grid.cell_count())?;
-        let at = self.steps.len() as u64;
-        let values_array = arrays::values(&self.description, at + 1)?;
-        let sent: Vec<_> = encoded(&self.encoder, &values)
-            .map(|object| {
-                let (folder, array) = (&self.folder, &values_array);
-                async move {
-                    let EncodedObject { index, content } = object?;
-                    let Some(content) = content else {
-                        return Ok(());
-                    };
-                    let [row, col] = index.map(u64::from);
-                    let key = array.chunk_key(&[at, row, col]);
-                    let set = folder.set(&key, content).await;
-                    set.map_err(|e| CubeError::library(key.as_str(), "writing", e))
-                }
-            })
-            .buffer_unordered(OBJECTS_AT_ONCE)
-            .try_collect()
-            .await?;
-        drop::<Vec<()>>(sent);
-        let step = Step {
-            period,
-            values_sha256: storage::fields::digest_of(&grid, &values, period),
-        };
-        self.steps.push(step);
-        Ok(step)
+    pub fn append(
+        &mut self,
+        period: Period,
+        values: Arc<[f32]>,
+    ) -> BoxFuture<'_, Result<Step, CubeError>> {
+        Box::pin(async move {
+            if let Some(last) = self.steps.last()
+                && period.start < last.period.end
+            {
+                return Err(CubeError::Overlap {
+                    step: period,
+                    there: last.period,
+                });
+            }
+            let grid = self.description.grid;
+            check_length(&values, grid.cell_count())?;
+            let at = self.steps.len() as u64;
+            let values_array = arrays::values(&self.description, at + 1)?;
+            let sent: Vec<_> = encoded(&self.encoder, &values)
+                .map(|object| {
+                    let (folder, array) = (&self.folder, &values_array);
+                    async move {
+                        let EncodedObject { index, content } = object?;
+                        let Some(content) = content else {
+                            return Ok(());
+                        };
+                        let [row, col] = index.map(u64::from);
+                        let key = array.chunk_key(&[at, row, col]);
+                        let set = folder.set(&key, content).await;
+                        set.map_err(|e| CubeError::library(key.as_str(), "writing", e))
+                    }
+                })
+                .buffer_unordered(OBJECTS_AT_ONCE)
+                .try_collect()
+                .await?;
+            drop::<Vec<()>>(sent);
+            let step = Step {
+                period,
+                values_sha256: storage::fields::digest_of(&grid, &values, period),
+            };
+            self.steps.push(step);
+            Ok(step)
+        })
     }
 
     /// Writes coordinates and metadata, the group's last: now it can be opened.

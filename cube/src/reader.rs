@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use bytes::Bytes;
 use contract::chunk::Window;
+use futures::future::BoxFuture;
 use futures::stream::{self, StreamExt as _, TryStreamExt as _};
 use icechunk::session::Session;
 use tokio::sync::RwLock;
@@ -115,9 +116,15 @@ impl Cube {
     }
 
     /// Values of a window of cells of a step, `[row, col]`, stored unit, NaN no data. Only its chunks are read.
-    pub async fn window(&self, step: usize, window: Window) -> Result<Vec<f32>, CubeError> {
-        let mut found = self.windows(step, &[window]).await?;
-        Ok(found.pop().unwrap_or_default())
+    pub fn window(
+        &self,
+        step: usize,
+        window: Window,
+    ) -> BoxFuture<'_, Result<Vec<f32>, CubeError>> {
+        Box::pin(async move {
+            let mut found = self.windows(step, &[window]).await?;
+            Ok(found.pop().unwrap_or_default())
+        })
     }
 
     /// The same of several windows; a chunk that some of them touch is read once.
@@ -151,35 +158,37 @@ impl Cube {
     }
 
     /// Values of a whole step, `[row, col]`, compared with their digest.
-    pub async fn field(&self, step: usize) -> Result<Vec<f32>, CubeError> {
-        let grid = self.0.description.grid;
-        let whole = Window {
-            row: 0,
-            col: 0,
-            rows: grid.rows,
-            cols: grid.cols,
-        };
-        let values = self.window(step, whole).await?;
-        let Step {
-            period,
-            values_sha256,
-        } = self.0.steps[step];
-        let digested = tokio::task::spawn_blocking(move || {
-            let digest = storage::fields::digest_of(&grid, &values, period);
-            (digest, values)
-        });
-        let array = || arrays::name(&self.0.array);
-        let (digest, values) = digested
-            .await
-            .map_err(|e| CubeError::library(&array(), "checking values", e))?;
-        if digest == values_sha256 {
-            Ok(values)
-        } else {
-            Err(CubeError::Step {
-                array: array(),
+    pub fn field(&self, step: usize) -> BoxFuture<'_, Result<Vec<f32>, CubeError>> {
+        Box::pin(async move {
+            let grid = self.0.description.grid;
+            let whole = Window {
+                row: 0,
+                col: 0,
+                rows: grid.rows,
+                cols: grid.cols,
+            };
+            let values = self.window(step, whole).await?;
+            let Step {
                 period,
-            })
-        }
+                values_sha256,
+            } = self.0.steps[step];
+            let digested = tokio::task::spawn_blocking(move || {
+                let digest = storage::fields::digest_of(&grid, &values, period);
+                (digest, values)
+            });
+            let array = || arrays::name(&self.0.array);
+            let (digest, values) = digested
+                .await
+                .map_err(|e| CubeError::library(&array(), "checking values", e))?;
+            if digest == values_sha256 {
+                Ok(values)
+            } else {
+                Err(CubeError::Step {
+                    array: array(),
+                    period,
+                })
+            }
+        })
     }
 
     /// The time-major run that holds a step, if it is there.

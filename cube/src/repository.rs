@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use futures::future::BoxFuture;
 use icechunk::RepositoryConfig;
 use icechunk::config::{
     ManifestConfig, ManifestSplitCondition, ManifestSplitDim, ManifestSplitDimCondition,
@@ -49,36 +50,38 @@ impl Repository {
     ///
     /// # Errors
     /// `Exists` if the folder is not empty.
-    pub async fn create(
-        store: &Store,
-        folder: &str,
-        description: &Description,
-    ) -> Result<Self, CubeError> {
-        let objects = ObjectStorage::new(store.clone(), folder);
-        let place = objects.to_string();
-        let made = icechunk::Repository::create(Arc::new(objects.clone()))
-            .config(config(description))
-            .spec_version(SpecVersionBin::V2)
-            .execute();
-        let inner = made.await.map_err(|e| match e.kind {
-            RepositoryErrorKind::ParentDirectoryNotClean => CubeError::Exists {
-                place: place.clone(),
-            },
-            _ => CubeError::library(&place, "making a repository", e),
-        })?;
-        let repository = Self {
-            inner,
-            description: description.clone(),
-            objects,
-            place,
-        };
-        let session = repository.session().await?;
-        let arrays = Arc::new(AsyncIcechunkStore::from(Arc::clone(&session)));
-        plain::write_frame_of_reference(&arrays, description).await?;
-        let mut session = session.write().await;
-        let made = session.commit("an empty cube").execute().await;
-        made.map_err(|e| repository.failed("committing an empty cube", &e))?;
-        Ok(repository)
+    pub fn create<'a>(
+        store: &'a Store,
+        folder: &'a str,
+        description: &'a Description,
+    ) -> BoxFuture<'a, Result<Self, CubeError>> {
+        Box::pin(async move {
+            let objects = ObjectStorage::new(store.clone(), folder);
+            let place = objects.to_string();
+            let made = icechunk::Repository::create(Arc::new(objects.clone()))
+                .config(config(description))
+                .spec_version(SpecVersionBin::V2)
+                .execute();
+            let inner = made.await.map_err(|e| match e.kind {
+                RepositoryErrorKind::ParentDirectoryNotClean => CubeError::Exists {
+                    place: place.clone(),
+                },
+                _ => CubeError::library(&place, "making a repository", e),
+            })?;
+            let repository = Self {
+                inner,
+                description: description.clone(),
+                objects,
+                place,
+            };
+            let session = repository.session().await?;
+            let arrays = Arc::new(AsyncIcechunkStore::from(Arc::clone(&session)));
+            plain::write_frame_of_reference(&arrays, description).await?;
+            let mut session = session.write().await;
+            let made = session.commit("an empty cube").execute().await;
+            made.map_err(|e| repository.failed("committing an empty cube", &e))?;
+            Ok(repository)
+        })
     }
 
     /// Opens the repository in a folder of a store, or makes one, for a change that gives it this description: it may have
@@ -140,20 +143,22 @@ impl Repository {
     ///
     /// # Errors
     /// `Missing` if there is none, `Foreign` if it is not of a product.
-    pub async fn open(store: &Store, folder: &str) -> Result<Self, CubeError> {
-        let inner = Self::open_inner(store, folder, None).await?;
-        let place = ObjectStorage::new(store.clone(), folder).to_string();
-        let version = VersionInfo::BranchTipRef(BRANCH.to_owned());
-        let session = inner.readonly_session(&version).await;
-        let session =
-            session.map_err(|e| CubeError::library(&place, "reading the newest state", e))?;
-        let arrays = Arc::new(AsyncIcechunkStore::new(session));
-        let description = Description::of_group(&arrays, &place).await?;
-        Ok(Self {
-            inner,
-            description,
-            objects: ObjectStorage::new(store.clone(), folder),
-            place,
+    pub fn open<'a>(store: &'a Store, folder: &'a str) -> BoxFuture<'a, Result<Self, CubeError>> {
+        Box::pin(async move {
+            let inner = Self::open_inner(store, folder, None).await?;
+            let place = ObjectStorage::new(store.clone(), folder).to_string();
+            let version = VersionInfo::BranchTipRef(BRANCH.to_owned());
+            let session = inner.readonly_session(&version).await;
+            let session =
+                session.map_err(|e| CubeError::library(&place, "reading the newest state", e))?;
+            let arrays = Arc::new(AsyncIcechunkStore::new(session));
+            let description = Description::of_group(&arrays, &place).await?;
+            Ok(Self {
+                inner,
+                description,
+                objects: ObjectStorage::new(store.clone(), folder),
+                place,
+            })
         })
     }
 
@@ -171,48 +176,56 @@ impl Repository {
     ///
     /// # Errors
     /// `NoVersion` with the versions there are.
-    pub async fn at(&self, at: &At) -> Result<Cube, CubeError> {
-        let version = match at {
-            At::Newest => VersionInfo::BranchTipRef(BRANCH.to_owned()),
-            At::Version(tag) => VersionInfo::TagRef(tag.clone()),
-        };
-        let session = match (self.inner.readonly_session(&version).await, at) {
-            (Ok(session), _) => session,
-            (Err(error), At::Newest) => {
-                return Err(self.failed("reading the newest state", &error));
-            }
-            (Err(error), At::Version(version)) => {
-                let there = self.versions().await?;
-                if there.contains(version) {
-                    return Err(self.failed("reading a version", &error));
+    pub fn at<'a>(&'a self, at: &'a At) -> BoxFuture<'a, Result<Cube, CubeError>> {
+        Box::pin(async move {
+            let version = match at {
+                At::Newest => VersionInfo::BranchTipRef(BRANCH.to_owned()),
+                At::Version(tag) => VersionInfo::TagRef(tag.clone()),
+            };
+            let session = match (self.inner.readonly_session(&version).await, at) {
+                (Ok(session), _) => session,
+                (Err(error), At::Newest) => {
+                    return Err(self.failed("reading the newest state", &error));
                 }
-                return Err(CubeError::NoVersion {
-                    place: self.place.clone(),
-                    version: version.clone(),
-                    there: if there.is_empty() {
-                        "none".to_owned()
-                    } else {
-                        there.join(", ")
-                    },
-                });
-            }
-        };
-        Cube::open(session, &self.objects).await
+                (Err(error), At::Version(version)) => {
+                    let there = self.versions().await?;
+                    if there.contains(version) {
+                        return Err(self.failed("reading a version", &error));
+                    }
+                    return Err(CubeError::NoVersion {
+                        place: self.place.clone(),
+                        version: version.clone(),
+                        there: if there.is_empty() {
+                            "none".to_owned()
+                        } else {
+                            there.join(", ")
+                        },
+                    });
+                }
+            };
+            Cube::open(session, &self.objects).await
+        })
     }
 
     /// Names a state for good: what cites it is answered the same ever after. Nothing is done if it has that name.
-    pub async fn tag(&self, version: &str, snapshot: &str) -> Result<(), CubeError> {
-        let id = SnapshotId::try_from(snapshot)
-            .map_err(|e| CubeError::library(&self.place, "naming a version", e))?;
-        let Err(error) = self.inner.create_tag(version, &id).await else {
-            return Ok(());
-        };
-        // Named before, by somebody else.
-        if self.is_tagged(version, snapshot).await {
-            Ok(())
-        } else {
-            Err(self.failed("naming a version", &error))
-        }
+    pub fn tag<'a>(
+        &'a self,
+        version: &'a str,
+        snapshot: &'a str,
+    ) -> BoxFuture<'a, Result<(), CubeError>> {
+        Box::pin(async move {
+            let id = SnapshotId::try_from(snapshot)
+                .map_err(|e| CubeError::library(&self.place, "naming a version", e))?;
+            let Err(error) = self.inner.create_tag(version, &id).await else {
+                return Ok(());
+            };
+            // Named before, by somebody else.
+            if self.is_tagged(version, snapshot).await {
+                Ok(())
+            } else {
+                Err(self.failed("naming a version", &error))
+            }
+        })
     }
 
     /// Has a state this name?
@@ -227,10 +240,12 @@ impl Repository {
     }
 
     /// Names of versions, sorted.
-    pub async fn versions(&self) -> Result<Vec<String>, CubeError> {
-        let tags = self.inner.list_tags().await;
-        let tags = tags.map_err(|e| self.failed("listing versions", &e))?;
-        Ok(tags.into_iter().collect())
+    pub fn versions(&self) -> BoxFuture<'_, Result<Vec<String>, CubeError>> {
+        Box::pin(async move {
+            let tags = self.inner.list_tags().await;
+            let tags = tags.map_err(|e| self.failed("listing versions", &e))?;
+            Ok(tags.into_iter().collect())
+        })
     }
 
     /// A session that changes the newest state.

@@ -13,6 +13,7 @@ use bytes::Bytes;
 use contract::chunk::Window;
 use contract::kind::Vouched;
 use contract::manifest::Manifest;
+use futures::future::BoxFuture;
 use futures::stream::{self, StreamExt as _, TryStreamExt as _};
 use storage::{Store, fields};
 
@@ -181,28 +182,33 @@ impl Values {
     ///
     /// # Errors
     /// A store that does not answer; a cube whose state cannot be read.
-    pub async fn of(store: &Store, manifest: &Arc<Manifest>) -> Result<Self, CubeError> {
-        let mut own = Inner {
-            store: store.clone(),
-            places: vec![Place::Field; manifest.steps.len()],
-            manifest: Arc::clone(manifest),
-            cubes: vec![],
-        };
-        let repository = match Repository::open(store, &folder(&manifest.product)).await {
-            Ok(repository) => repository,
-            Err(CubeError::Missing { .. }) => return Ok(Self(Arc::new(own))),
-            Err(error) => return Err(error),
-        };
-        own.take(repository.at(&At::Newest).await?);
-        if own.places.contains(&Place::Field) {
-            let version = At::Version(manifest.number.to_string());
-            match repository.at(&version).await {
-                Ok(cube) => own.take(cube),
-                Err(CubeError::NoVersion { .. }) => {}
+    pub fn of<'a>(
+        store: &'a Store,
+        manifest: &'a Arc<Manifest>,
+    ) -> BoxFuture<'a, Result<Self, CubeError>> {
+        Box::pin(async move {
+            let mut own = Inner {
+                store: store.clone(),
+                places: vec![Place::Field; manifest.steps.len()],
+                manifest: Arc::clone(manifest),
+                cubes: vec![],
+            };
+            let repository = match Repository::open(store, &folder(&manifest.product)).await {
+                Ok(repository) => repository,
+                Err(CubeError::Missing { .. }) => return Ok(Self(Arc::new(own))),
                 Err(error) => return Err(error),
+            };
+            own.take(repository.at(&At::Newest).await?);
+            if own.places.contains(&Place::Field) {
+                let version = At::Version(manifest.number.to_string());
+                match repository.at(&version).await {
+                    Ok(cube) => own.take(cube),
+                    Err(CubeError::NoVersion { .. }) => {}
+                    Err(error) => return Err(error),
+                }
             }
-        }
-        Ok(Self(Arc::new(own)))
+            Ok(Self(Arc::new(own)))
+        })
     }
 
     /// The version.
@@ -260,42 +266,46 @@ impl Values {
     ///
     /// # Errors
     /// `Outside` if there is no such cell; a chunk that is damaged or gone, by its name.
-    pub async fn cell(&self, row: u32, col: u32) -> Result<Vec<f32>, CubeError> {
-        let steps = 0..self.0.places.len();
-        let at = [row / BLOCK_CELLS, col / BLOCK_CELLS];
-        let mut block = Block::empty(&self.0.manifest, at, 0)?;
-        let Window { rows, cols, .. } = block.window;
-        if row - block.window.row >= rows || col - block.window.col >= cols {
-            return Err(self.outside(&format!("cell {row}, {col}")));
-        }
-        block.window = Window {
-            row,
-            col,
-            rows: 1,
-            cols: 1,
-        };
-        block.values = vec![f32::NAN; steps.len()];
-        let mut blocks = vec![block];
-        self.read(&mut blocks, steps).await?;
-        Ok(blocks.pop().map(|block| block.values).unwrap_or_default())
+    pub fn cell(&self, row: u32, col: u32) -> BoxFuture<'_, Result<Vec<f32>, CubeError>> {
+        Box::pin(async move {
+            let steps = 0..self.0.places.len();
+            let at = [row / BLOCK_CELLS, col / BLOCK_CELLS];
+            let mut block = Block::empty(&self.0.manifest, at, 0)?;
+            let Window { rows, cols, .. } = block.window;
+            if row - block.window.row >= rows || col - block.window.col >= cols {
+                return Err(self.outside(&format!("cell {row}, {col}")));
+            }
+            block.window = Window {
+                row,
+                col,
+                rows: 1,
+                cols: 1,
+            };
+            block.values = vec![f32::NAN; steps.len()];
+            let mut blocks = vec![block];
+            self.read(&mut blocks, steps).await?;
+            Ok(blocks.pop().map(|block| block.values).unwrap_or_default())
+        })
     }
 
     /// Values of some blocks in a run of steps of the version, in the order asked for. As many are held at once.
     ///
     /// # Errors
     /// As [`Values::cell`].
-    pub async fn blocks(
-        &self,
-        blocks: &[[u32; 2]],
+    pub fn blocks<'a>(
+        &'a self,
+        blocks: &'a [[u32; 2]],
         steps: Range<usize>,
-    ) -> Result<Vec<Block>, CubeError> {
-        if steps.start > steps.end || steps.end > self.0.places.len() {
-            return Err(self.outside(&format!("steps {steps:?}")));
-        }
-        let empty = |at: &[u32; 2]| Block::empty(&self.0.manifest, *at, steps.len());
-        let mut found: Vec<Block> = blocks.iter().map(empty).collect::<Result<_, _>>()?;
-        self.read(&mut found, steps).await?;
-        Ok(found)
+    ) -> BoxFuture<'a, Result<Vec<Block>, CubeError>> {
+        Box::pin(async move {
+            if steps.start > steps.end || steps.end > self.0.places.len() {
+                return Err(self.outside(&format!("steps {steps:?}")));
+            }
+            let empty = |at: &[u32; 2]| Block::empty(&self.0.manifest, *at, steps.len());
+            let mut found: Vec<Block> = blocks.iter().map(empty).collect::<Result<_, _>>()?;
+            self.read(&mut found, steps).await?;
+            Ok(found)
+        })
     }
 
     /// Blocks of a run of steps as they are stored, where the time-major copy holds all of these steps; they are decoded one
@@ -303,25 +313,27 @@ impl Values {
     ///
     /// # Errors
     /// As [`Values::cell`].
-    pub async fn encoded(
-        &self,
-        blocks: &[[u32; 2]],
+    pub fn encoded<'a>(
+        &'a self,
+        blocks: &'a [[u32; 2]],
         steps: Range<usize>,
-    ) -> Result<Option<EncodedBlocks>, CubeError> {
-        if steps.start > steps.end || steps.end > self.0.places.len() {
-            return Err(self.outside(&format!("steps {steps:?}")));
-        }
-        let Some((cube, run, pieces)) = self.run_of(&steps) else {
-            return Ok(None);
-        };
-        let content = cube.encoded(run, blocks).await?;
-        Ok(Some(EncodedBlocks {
-            cube,
-            run,
-            at: blocks.to_vec(),
-            content,
-            pieces,
-        }))
+    ) -> BoxFuture<'a, Result<Option<EncodedBlocks>, CubeError>> {
+        Box::pin(async move {
+            if steps.start > steps.end || steps.end > self.0.places.len() {
+                return Err(self.outside(&format!("steps {steps:?}")));
+            }
+            let Some((cube, run, pieces)) = self.run_of(&steps) else {
+                return Ok(None);
+            };
+            let content = cube.encoded(run, blocks).await?;
+            Ok(Some(EncodedBlocks {
+                cube,
+                run,
+                at: blocks.to_vec(),
+                content,
+                pieces,
+            }))
+        })
     }
 
     /// The one run that holds all of these steps, and where; none where several do, or none.

@@ -9,6 +9,7 @@ use contract::key::ObjectKey;
 use contract::kind::Kind;
 use contract::product::ProductId;
 use futures::TryStreamExt as _;
+use futures::future::BoxFuture;
 use icechunk::format::manifest::ChunkPayload;
 use storage::verify::{Fault, Finding};
 use storage::{Store, manifests};
@@ -44,33 +45,35 @@ pub async fn products(store: &Store) -> Result<Vec<ProductId>, CubeError> {
 ///
 /// # Errors
 /// The store does not answer. Whatever is wrong with the cube is a finding.
-pub async fn check(
-    store: &Store,
-    product: &ProductId,
-    damaged: &BTreeSet<ObjectKey>,
-) -> Result<Checked, CubeError> {
-    let folder = folder(product);
-    let check = Check {
-        store,
-        entry: format!("{folder}/repo")
-            .parse()
-            .map_err(|e| named(&folder, &e))?,
-        there: store.list(&folder).await?.into_iter().collect(),
-        is_damaged: damaged.iter().any(|key| key.is_in(&folder)),
-        folder,
-        damaged,
-    };
-    let mut checked = Checked::default();
-    match check.versions(product, &mut checked).await {
-        Ok(()) => {}
-        // What it needs is damaged, and told of already.
-        Err(error) if check.is_damaged => {
-            tracing::debug!(%error, "what is left of a cube cannot be read");
+pub fn check<'a>(
+    store: &'a Store,
+    product: &'a ProductId,
+    damaged: &'a BTreeSet<ObjectKey>,
+) -> BoxFuture<'a, Result<Checked, CubeError>> {
+    Box::pin(async move {
+        let folder = folder(product);
+        let check = Check {
+            store,
+            entry: format!("{folder}/repo")
+                .parse()
+                .map_err(|e| named(&folder, &e))?,
+            there: store.list(&folder).await?.into_iter().collect(),
+            is_damaged: damaged.iter().any(|key| key.is_in(&folder)),
+            folder,
+            damaged,
+        };
+        let mut checked = Checked::default();
+        match check.versions(product, &mut checked).await {
+            Ok(()) => {}
+            // What it needs is damaged, and told of already.
+            Err(error) if check.is_damaged => {
+                tracing::debug!(%error, "what is left of a cube cannot be read");
+            }
+            Err(CubeError::Storage(error)) => return Err(error.into()),
+            Err(error) => checked.findings.push(check.finding(&error)),
         }
-        Err(CubeError::Storage(error)) => return Err(error.into()),
-        Err(error) => checked.findings.push(check.finding(&error)),
-    }
-    Ok(checked)
+        Ok(checked)
+    })
 }
 
 fn named(place: &str, error: &dyn std::fmt::Display) -> CubeError {
@@ -276,39 +279,44 @@ impl Check<'_> {
 ///
 /// # Errors
 /// The store does not answer; a field that the cube is made of is damaged or gone.
-pub async fn mend(store: &Store, product: &ProductId) -> Result<bool, CubeError> {
-    let folder = folder(product);
-    let keys = store.list(&folder).await?;
-    let damaged = storage::verify::damaged(store, keys.iter().cloned()).await?;
-    let mut is_whole = damaged.is_empty();
-    if is_whole && !keys.is_empty() {
-        let checked = check(store, product, &damaged).await?;
-        let mut faults = checked.findings.iter().map(|finding| finding.fault);
-        is_whole = faults.all(|fault| fault == Fault::Behind);
-    }
-    let versions = manifests::numbers(store, product).await?;
-    let Some(newest) = manifests::latest(store, product).await? else {
-        return Ok(false);
-    };
-    // Of a newer version than there is: somebody took the newest manifest away.
-    if is_whole
-        && let Ok(followed) = crate::follow(store, &newest).await
-        && followed.version == newest.id()
-    {
-        compact::compact(store, &folder).await?;
-        return Ok(false);
-    }
-    // What says where all else is goes last: until then others find a damaged cube, and none that they may add to.
-    let entry = format!("{folder}/repo");
-    let (last, first): (Vec<_>, Vec<_>) = keys.iter().partition(|key| key.is_in(&entry));
-    for key in first.into_iter().chain(last) {
-        store.remove(key).await?;
-    }
-    for number in versions {
-        if let Some(manifest) = manifests::numbered(store, product, number).await? {
-            crate::follow(store, &manifest).await?;
+pub fn mend<'a>(
+    store: &'a Store,
+    product: &'a ProductId,
+) -> BoxFuture<'a, Result<bool, CubeError>> {
+    Box::pin(async move {
+        let folder = folder(product);
+        let keys = store.list(&folder).await?;
+        let damaged = storage::verify::damaged(store, keys.iter().cloned()).await?;
+        let mut is_whole = damaged.is_empty();
+        if is_whole && !keys.is_empty() {
+            let checked = check(store, product, &damaged).await?;
+            let mut faults = checked.findings.iter().map(|finding| finding.fault);
+            is_whole = faults.all(|fault| fault == Fault::Behind);
         }
-    }
-    compact::compact(store, &folder).await?;
-    Ok(true)
+        let versions = manifests::numbers(store, product).await?;
+        let Some(newest) = manifests::latest(store, product).await? else {
+            return Ok(false);
+        };
+        // Of a newer version than there is: somebody took the newest manifest away.
+        if is_whole
+            && let Ok(followed) = crate::follow(store, &newest).await
+            && followed.version == newest.id()
+        {
+            compact::compact(store, &folder).await?;
+            return Ok(false);
+        }
+        // What says where all else is goes last: until then others find a damaged cube, and none that they may add to.
+        let entry = format!("{folder}/repo");
+        let (last, first): (Vec<_>, Vec<_>) = keys.iter().partition(|key| key.is_in(&entry));
+        for key in first.into_iter().chain(last) {
+            store.remove(key).await?;
+        }
+        for number in versions {
+            if let Some(manifest) = manifests::numbered(store, product, number).await? {
+                crate::follow(store, &manifest).await?;
+            }
+        }
+        compact::compact(store, &folder).await?;
+        Ok(true)
+    })
 }

@@ -103,6 +103,12 @@ pub(crate) struct Settings {
     /// Ballista scheduler to compute on, `http://HOST:PORT`; in this process without it. Answers are the same bits.
     #[arg(long, env = "FLUXGLOBE_CLUSTER", global = true, value_name = "URL")]
     pub(crate) cluster: Option<String>,
+    /// Seconds that the cluster may take for one query, 1 to 604,800: then it is given up, and the reason told. No executor
+    /// may have room for it, or the scheduler may hang.
+    #[arg(long, env = "FLUXGLOBE_CLUSTER_LIMIT_S", global = true, value_name = "SECONDS",
+          default_value_t = compute::cluster::QUERY_LIMIT.as_secs(),
+          value_parser = clap::value_parser!(u64).range(1..=604_800))]
+    pub(crate) cluster_limit_s: u64,
     /// Draw with the processor alone instead of a Vulkan device.
     #[arg(long, env = "FLUXGLOBE_CPU", global = true)]
     pub(crate) cpu: bool,

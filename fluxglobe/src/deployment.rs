@@ -3,6 +3,7 @@
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::Duration;
 
 use anyhow::{Context as _, Result, bail};
 use compute::Engine;
@@ -102,16 +103,14 @@ pub(crate) fn in_process(settings: &Settings, store: Store) -> Engine {
     Engine::in_process(store, parts)
 }
 
-fn cluster(settings: &Settings, store: Store, scheduler: &str) -> Result<Engine> {
-    Ok(Engine::cluster(
-        store,
-        scheduler.parse()?,
-        least_parts(settings),
-    ))
+/// The Ballista cluster of a scheduler.
+pub(crate) fn cluster(settings: &Settings, store: Store, scheduler: &str) -> Result<Engine> {
+    let engine = Engine::cluster(store, scheduler.parse()?, least_parts(settings));
+    Ok(engine.with_query_limit(Duration::from_secs(settings.cluster_limit_s)))
 }
 
 /// Parts of a query that a cluster is asked for at least; its scheduler makes as many as its executors have room for.
-pub(crate) fn least_parts(settings: &Settings) -> NonZeroUsize {
+fn least_parts(settings: &Settings) -> NonZeroUsize {
     settings
         .partitions
         .map_or(NonZeroUsize::MIN, NonZeroUsize::from)

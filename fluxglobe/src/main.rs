@@ -1,6 +1,4 @@
 //! `fluxglobe`: the one program; reads the command line, runs the command, says what failed.
-// Questions of questions (a history of budgets with their errors) are futures within futures.
-#![recursion_limit = "256"]
 
 mod animation;
 mod bench;

@@ -195,6 +195,17 @@ impl Store {
         format!("{}{key}", self.url)
     }
 
+    /// The same store, its requests passing through a layer of the caller's, which counts them, say, or delays them. A folder
+    /// creates its objects beside it.
+    #[must_use]
+    pub fn through(&self, layer: impl Fn(Arc<dyn ObjectStore>) -> Arc<dyn ObjectStore>) -> Self {
+        Self {
+            objects: layer(Arc::clone(&self.objects)),
+            root: layer(Arc::clone(&self.root)),
+            ..self.clone()
+        }
+    }
+
     /// What SQL scans register, once for all objects: a URL of a scheme and a host, and the store that answers for
     /// every path below it. [`Store::sql_url`] names an object in it.
     pub fn sql_root(&self) -> (Url, Arc<dyn ObjectStore>) {

@@ -1,23 +1,23 @@
-//! Series and budgets from the analyst, within limits; those of regions are remembered, since their question names a
-//! version.
+//! Series and budgets from the analyst, within limits, and remembered: every question names a version.
 
 mod of_series;
 
 use std::future::Future;
 use std::sync::Arc;
 
+use bytes::Bytes;
 use contract::budget::{
     AskedRiver, BudgetAnswer, BudgetErrors, BudgetHistory, BudgetParts, BudgetQuery,
 };
 use contract::check::Check;
 use contract::digest::Digest;
 use contract::grid::LonLatDeg;
-use contract::series::{PointSeries, RegionSeries, RegionSeriesQuery};
+use contract::series::{RegionSeries, RegionSeriesQuery};
 use contract::statistics::{StatisticsAnswer, StatisticsQuery};
 use quick_cache::Weighter;
 use quick_cache::sync::Cache;
 
-use crate::backend::{Analyse, BackendError, MadeOfSeries};
+use crate::backend::{Analyse, MadeOfSeries};
 use crate::catalogue::Layer;
 use crate::error::ServerError;
 use crate::gate::Gate;
@@ -30,6 +30,10 @@ const BUDGETS: usize = 1000;
 const BUDGET_ROWS: u64 = 1 << 17;
 /// Histories of budgets remembered; one of 200 versions takes 60 KiB.
 const HISTORIES: usize = 100;
+/// Series of points remembered, a guess that sizes tables; one of 16 years of days takes 600 KiB.
+const POINTS: usize = 50;
+/// Bytes of all of them.
+const POINT_BYTES: u64 = 32 << 20;
 /// Series over regions remembered; one of 16 years of days takes 320 KiB.
 const AREAS: usize = 100;
 /// What is made of series and remembered; a Hovmöller diagram takes 8 MiB at most.
@@ -77,6 +81,8 @@ pub struct Analyses {
     metrics: Metrics,
     budgets: Answers<BudgetAnswer>,
     histories: Answers<BudgetHistory>,
+    /// As the texts that they are answered with, which take longer to write than values take to read.
+    points: Answers<Bytes>,
     areas: Answers<RegionSeries>,
     statistics: Answers<StatisticsAnswer>,
     made_of_series: Answers<MadeOfSeries>,
@@ -113,12 +119,12 @@ impl<T: Send + Sync + 'static> Answers<T> {
     }
 
     /// The answer to a question: one that is remembered, or `computed` behind the gate, once for all who ask meanwhile.
-    async fn answer(
+    async fn answer<E: Into<ServerError> + Send + 'static>(
         &self,
         key: Digest,
         gate: &Gate,
         metrics: &Metrics,
-        computed: impl Future<Output = Result<T, BackendError>> + Send + 'static,
+        computed: impl Future<Output = Result<T, E>> + Send + 'static,
     ) -> Result<Arc<T>, ServerError> {
         if let Some(answer) = self.remembered.get(&key) {
             return Ok(answer);
@@ -129,7 +135,7 @@ impl<T: Send + Sync + 'static> Answers<T> {
                 .enter()
                 .await
                 .inspect_err(|_busy| metrics.refused.inc())?;
-            Ok(Arc::new(computed.await?))
+            Ok(Arc::new(computed.await.map_err(Into::into)?))
         };
         let answer = self.under_way.join(key, behind_the_gate).await?;
         self.remembered.insert(key, Arc::clone(&answer));
@@ -146,28 +152,33 @@ impl Analyses {
             metrics,
             budgets: Answers::new(BUDGETS, BUDGET_ROWS, budget_rows),
             histories: Answers::new(HISTORIES, HISTORIES as u64, |_one| 1),
+            points: Answers::new(POINTS, POINT_BYTES, |text| text.len() as u64),
             areas: Answers::new(AREAS, AREAS as u64, |_one| 1),
             statistics: Answers::new(STATISTICS, STATISTICS_NUMBERS, numbers),
             made_of_series: Answers::new(MADE_OF_SERIES, MADE_OF_SERIES as u64, |_one| 1),
         }
     }
 
-    /// The series of the cell at a place.
-    pub async fn point(&self, layer: &Layer, place: LonLatDeg) -> Result<PointSeries, ServerError> {
-        let _pass = self
-            .gate
-            .enter()
-            .await
-            .inspect_err(|_busy| self.metrics.refused.inc())?;
-        let (manifest, id) = (&layer.manifest, &layer.id);
-        let answer = self.analyst.point(manifest, id, place).await?;
-        let (values, steps) = (answer.series.len(), manifest.steps.len());
-        if values != steps {
-            return Err(ServerError::Defect {
-                what: format!("the analyst gave {values} values for {steps} steps"),
-            });
-        }
-        Ok(answer)
+    /// The series of the cell at a place, a [`contract::series::PointSeries`] as JSON.
+    pub async fn point(&self, layer: &Layer, place: LonLatDeg) -> Result<Bytes, ServerError> {
+        let key = Digest::of_json(&("point", &layer.id, place));
+        let (analyst, manifest) = (Arc::clone(&self.analyst), Arc::clone(&layer.manifest));
+        let id = layer.id.clone();
+        let computed = async move {
+            let answer = analyst.point(&manifest, &id, place).await?;
+            let (values, steps) = (answer.series.len(), manifest.steps.len());
+            if values != steps {
+                return Err(ServerError::Defect {
+                    what: format!("the analyst gave {values} values for {steps} steps"),
+                });
+            }
+            let text = serde_json::to_vec(&answer).map_err(|e| ServerError::Defect {
+                what: format!("a series that is no JSON: {e}"),
+            })?;
+            Ok::<_, ServerError>(Bytes::from(text))
+        };
+        let text = self.points.answer(key, &self.gate, &self.metrics, computed);
+        Ok(Bytes::clone(&*text.await?))
     }
 
     /// A budget of `layer`.

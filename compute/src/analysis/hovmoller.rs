@@ -8,6 +8,7 @@ use contract::cited::Cited;
 use contract::grid::Grid;
 use contract::manifest::{Manifest, Step};
 use contract::time::Period;
+use futures::future::BoxFuture;
 use futures::{StreamExt as _, TryStreamExt as _};
 use storage::{Store, domain, fields};
 
@@ -30,73 +31,75 @@ const BANDS_DEG: [f64; 4] = [1.0, 2.0, 5.0, 10.0];
 ///
 /// # Errors
 /// No step in the period, nothing of the grid inside the bounds, bands below the size of cells, more means than one answer holds.
-pub async fn hovmoller(
-    store: &Store,
-    (manifest, id): Version<'_>,
-    query: &HovmollerQuery,
-) -> Result<Hovmoller, ComputeError> {
-    let (_window, steps) = manifest.steps_inside(query.from, query.to)?;
-    let grid = &manifest.grid;
-    let band_deg = band_deg(grid, query)?;
-    let bounds_deg = bounds_deg(grid, query)?;
-    let bands = Bands::of(grid, query.along, band_deg, bounds_deg, query.earth);
-    if bands.edges_deg().is_empty() {
-        let reason = format!(
-            "no cell of {} has its middle in it; it covers {}",
-            manifest.product,
-            manifest.bounds_text()
-        );
-        let text = bounds_deg.map(|edge| edge.to_string()).join(",");
-        return Err(ContractError::invalid("region", &text, reason).into());
-    }
-    let periods: Vec<Period> = steps.iter().map(|step| step.period).collect();
-    let step = no_shorter(&periods, query.step);
-    let bins = bins_over(&periods, step);
-    let means = bins.len().saturating_mul(bands.edges_deg().len());
-    if means > MOST_MEANS {
-        let reason = format!(
-            "{means} means are more than an answer's {MOST_MEANS}: ask for longer steps, wider bands or a shorter period"
-        );
-        return Err(ContractError::invalid("step", step.as_str(), reason).into());
-    }
-    let bands = Arc::new(bands);
-    let areas_m2 = domain_areas(store, manifest, &bands).await?;
-    let sums = sums_in(store, manifest, &steps, &bands, &bins).await?;
-    let display = manifest.quantity.display();
-    let row = |(bin, sums): (&Period, &Vec<BandSum>)| HovmollerRow {
-        start: bin.start,
-        end: bin.end,
-        means: sums
-            .iter()
-            .map(|sum| (sum.area_m2 > 0.0).then(|| display.shown(sum.weighted / sum.area_m2)))
-            .collect(),
-        coverage_percent: sums
-            .iter()
-            .zip(&areas_m2)
-            .map(|(sum, area_m2)| {
-                let all = area_m2 * bin.seconds();
-                if all > 0.0 {
-                    (100.0 * sum.area_m2 / all).min(100.0)
-                } else {
-                    0.0
-                }
-            })
-            .collect(),
-    };
-    let band = |((low_deg, high_deg), area_m2): (&(f64, f64), &f64)| HovmollerBand {
-        low_deg: *low_deg,
-        high_deg: *high_deg,
-        area_m2: *area_m2,
-    };
-    Ok(Hovmoller {
-        cited: Cited::of(manifest, id.clone()),
-        along: query.along,
-        band_deg,
-        bounds_deg,
-        step,
-        earth: query.earth,
-        bands: bands.edges_deg().iter().zip(&areas_m2).map(band).collect(),
-        rows: bins.iter().zip(&sums).map(row).collect(),
+pub fn hovmoller<'a>(
+    store: &'a Store,
+    (manifest, id): Version<'a>,
+    query: &'a HovmollerQuery,
+) -> BoxFuture<'a, Result<Hovmoller, ComputeError>> {
+    Box::pin(async move {
+        let (_window, steps) = manifest.steps_inside(query.from, query.to)?;
+        let grid = &manifest.grid;
+        let band_deg = band_deg(grid, query)?;
+        let bounds_deg = bounds_deg(grid, query)?;
+        let bands = Bands::of(grid, query.along, band_deg, bounds_deg, query.earth);
+        if bands.edges_deg().is_empty() {
+            let reason = format!(
+                "no cell of {} has its middle in it; it covers {}",
+                manifest.product,
+                manifest.bounds_text()
+            );
+            let text = bounds_deg.map(|edge| edge.to_string()).join(",");
+            return Err(ContractError::invalid("region", &text, reason).into());
+        }
+        let periods: Vec<Period> = steps.iter().map(|step| step.period).collect();
+        let step = no_shorter(&periods, query.step);
+        let bins = bins_over(&periods, step);
+        let means = bins.len().saturating_mul(bands.edges_deg().len());
+        if means > MOST_MEANS {
+            let reason = format!(
+                "{means} means are more than an answer's {MOST_MEANS}: ask for longer steps, wider bands or a shorter period"
+            );
+            return Err(ContractError::invalid("step", step.as_str(), reason).into());
+        }
+        let bands = Arc::new(bands);
+        let areas_m2 = domain_areas(store, manifest, &bands).await?;
+        let sums = sums_in(store, manifest, &steps, &bands, &bins).await?;
+        let display = manifest.quantity.display();
+        let row = |(bin, sums): (&Period, &Vec<BandSum>)| HovmollerRow {
+            start: bin.start,
+            end: bin.end,
+            means: sums
+                .iter()
+                .map(|sum| (sum.area_m2 > 0.0).then(|| display.shown(sum.weighted / sum.area_m2)))
+                .collect(),
+            coverage_percent: sums
+                .iter()
+                .zip(&areas_m2)
+                .map(|(sum, area_m2)| {
+                    let all = area_m2 * bin.seconds();
+                    if all > 0.0 {
+                        (100.0 * sum.area_m2 / all).min(100.0)
+                    } else {
+                        0.0
+                    }
+                })
+                .collect(),
+        };
+        let band = |((low_deg, high_deg), area_m2): (&(f64, f64), &f64)| HovmollerBand {
+            low_deg: *low_deg,
+            high_deg: *high_deg,
+            area_m2: *area_m2,
+        };
+        Ok(Hovmoller {
+            cited: Cited::of(manifest, id.clone()),
+            along: query.along,
+            band_deg,
+            bounds_deg,
+            step,
+            earth: query.earth,
+            bands: bands.edges_deg().iter().zip(&areas_m2).map(band).collect(),
+            rows: bins.iter().zip(&sums).map(row).collect(),
+        })
     })
 }
 

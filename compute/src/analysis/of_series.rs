@@ -2,6 +2,7 @@
 //! and extremes out, each or the reason why there is none.
 
 use contract::analysis::{AnalysisOptions, AnalysisPart, Refused, SeriesAnalysis, SeriesQuery};
+use futures::future::BoxFuture;
 
 use super::climatology::{anomalies, climatology};
 use super::extremes::extremes;
@@ -15,18 +16,20 @@ use crate::{ComputeError, Engine};
 ///
 /// # Errors
 /// Those of reading the series. What is not defined for it is said in the answer.
-pub async fn analyse(
-    engine: &Engine,
-    of: Version<'_>,
-    query: &SeriesQuery,
-    options: &AnalysisOptions,
-) -> Result<SeriesAnalysis, ComputeError> {
-    let read = read::series(engine, of, query).await?;
-    let options = options.clone();
-    // Pairs of thousands of steps take a moment.
-    tokio::task::spawn_blocking(move || made_of(read, &options))
-        .await
-        .map_err(|e| ComputeError::inconsistent("analysis", e))
+pub fn analyse<'a>(
+    engine: &'a Engine,
+    of: Version<'a>,
+    query: &'a SeriesQuery,
+    options: &'a AnalysisOptions,
+) -> BoxFuture<'a, Result<SeriesAnalysis, ComputeError>> {
+    Box::pin(async move {
+        let read = read::series(engine, of, query).await?;
+        let options = options.clone();
+        // Pairs of thousands of steps take a moment.
+        tokio::task::spawn_blocking(move || made_of(read, &options))
+            .await
+            .map_err(|e| ComputeError::inconsistent("analysis", e))
+    })
 }
 
 fn made_of(read: ReadSeries, options: &AnalysisOptions) -> SeriesAnalysis {

@@ -5,6 +5,7 @@ use contract::analysis::{
     CalendarBins, Correlation, CorrelationQuery, Difference, DifferenceSide, SeriesQuery,
 };
 use contract::time::{Period, TimeStep};
+use futures::future::BoxFuture;
 
 use super::climatology::deseasonalised;
 use super::correlation::correlations;
@@ -20,51 +21,53 @@ const SEASONS_FROM_MONTHS: usize = 24;
 ///
 /// # Errors
 /// Those of reading either; nothing that both cover; steps that have no common ones.
-pub async fn correlation(
-    engine: &Engine,
-    first: Version<'_>,
-    second: Version<'_>,
-    query: &CorrelationQuery,
-) -> Result<Correlation, ComputeError> {
-    let other = query.series.of_product(query.with.clone());
-    let a = read::series(engine, first, &query.series).await?;
-    let b = read::series(engine, second, &other).await?;
-    let (bins, mut values) = on_common_bins(&a, &b, query.step)?;
-    if query.deseasonalise {
-        let step_s = longest_s(&bins);
-        if step_s > CalendarBins::Month.longest_step_s() {
-            let reason = "seasons can be taken off steps of months or shorter ones";
-            return Err(ContractError::invalid("step", query.step.as_str(), reason).into());
+pub fn correlation<'a>(
+    engine: &'a Engine,
+    first: Version<'a>,
+    second: Version<'a>,
+    query: &'a CorrelationQuery,
+) -> BoxFuture<'a, Result<Correlation, ComputeError>> {
+    Box::pin(async move {
+        let other = query.series.of_product(query.with.clone());
+        let a = read::series(engine, first, &query.series).await?;
+        let b = read::series(engine, second, &other).await?;
+        let (bins, mut values) = on_common_bins(&a, &b, query.step)?;
+        if query.deseasonalise {
+            let step_s = longest_s(&bins);
+            if step_s > CalendarBins::Month.longest_step_s() {
+                let reason = "seasons can be taken off steps of months or shorter ones";
+                return Err(ContractError::invalid("step", query.step.as_str(), reason).into());
+            }
+            values = values.map(|values| deseasonalised(&bins, &values));
         }
-        values = values.map(|values| deseasonalised(&bins, &values));
-    }
-    let rows = correlations(&values[0], &values[1], query.max_lag);
-    let strongest = rows
-        .iter()
-        .filter_map(|row| Some((row.lag_steps, row.correlation?.abs())))
-        // Of equally strong ones the least lag, and of these the first leading.
-        .max_by(|a, b| {
-            let nearer = b.0.abs().cmp(&a.0.abs()).then(a.0.cmp(&b.0));
-            a.1.total_cmp(&b.1).then(nearer)
-        });
-    let mut notes = a.notes;
-    notes.extend(
-        b.notes
-            .into_iter()
-            .filter(|note| !notes.contains(note))
-            .collect::<Vec<_>>(),
-    );
-    Ok(Correlation {
-        first: a.cited,
-        second: b.cited,
-        place: a.place,
-        step: query.step,
-        deseasonalised: query.deseasonalise,
-        start: bins[0].start,
-        end: bins[bins.len() - 1].end,
-        notes,
-        rows,
-        strongest_lag_steps: strongest.map(|(lag, _)| lag),
+        let rows = correlations(&values[0], &values[1], query.max_lag);
+        let strongest = rows
+            .iter()
+            .filter_map(|row| Some((row.lag_steps, row.correlation?.abs())))
+            // Of equally strong ones the least lag, and of these the first leading.
+            .max_by(|a, b| {
+                let nearer = b.0.abs().cmp(&a.0.abs()).then(a.0.cmp(&b.0));
+                a.1.total_cmp(&b.1).then(nearer)
+            });
+        let mut notes = a.notes;
+        notes.extend(
+            b.notes
+                .into_iter()
+                .filter(|note| !notes.contains(note))
+                .collect::<Vec<_>>(),
+        );
+        Ok(Correlation {
+            first: a.cited,
+            second: b.cited,
+            place: a.place,
+            step: query.step,
+            deseasonalised: query.deseasonalise,
+            start: bins[0].start,
+            end: bins[bins.len() - 1].end,
+            notes,
+            rows,
+            strongest_lag_steps: strongest.map(|(lag, _)| lag),
+        })
     })
 }
 
@@ -111,46 +114,49 @@ fn on_common_bins(
 ///
 /// # Errors
 /// Those of reading either; two units; twice the same.
-pub async fn difference(
-    engine: &Engine,
-    of: (Version<'_>, &SeriesQuery),
-    minus: (Version<'_>, &SeriesQuery),
-) -> Result<Difference, ComputeError> {
-    let (a_id, b_id) = (of.0.1, minus.0.1);
-    if a_id == b_id && of.1.window() == minus.1.window() {
-        let reason = "both sides are the same: give another product, version or period to take off";
-        return Err(ContractError::invalid("difference", &a_id.to_string(), reason).into());
-    }
-    let a = read::series(engine, of.0, of.1).await?;
-    let b = read::series(engine, minus.0, minus.1).await?;
-    if a.cited.unit != b.cited.unit || a.cited.quantity != b.cited.quantity {
-        let reason = format!(
-            "{} is in {}, {} in {}: they have no difference",
-            a.cited.product, a.cited.unit, b.cited.product, b.cited.unit
+pub fn difference<'a>(
+    engine: &'a Engine,
+    of: (Version<'a>, &'a SeriesQuery),
+    minus: (Version<'a>, &'a SeriesQuery),
+) -> BoxFuture<'a, Result<Difference, ComputeError>> {
+    Box::pin(async move {
+        let (a_id, b_id) = (of.0.1, minus.0.1);
+        if a_id == b_id && of.1.window() == minus.1.window() {
+            let reason =
+                "both sides are the same: give another product, version or period to take off";
+            return Err(ContractError::invalid("difference", &a_id.to_string(), reason).into());
+        }
+        let a = read::series(engine, of.0, of.1).await?;
+        let b = read::series(engine, minus.0, minus.1).await?;
+        if a.cited.unit != b.cited.unit || a.cited.quantity != b.cited.quantity {
+            let reason = format!(
+                "{} is in {}, {} in {}: they have no difference",
+                a.cited.product, a.cited.unit, b.cited.product, b.cited.unit
+            );
+            return Err(
+                ContractError::invalid("difference", &b.cited.product.to_string(), reason).into(),
+            );
+        }
+        let (mean_a, mean_b) = (of_side(&a), of_side(&b));
+        let difference = mean_a.mean.zip(mean_b.mean).map(|(a, b)| a - b);
+        let error = welch(&mean_a, &mean_b);
+        let mut notes = a.notes.clone();
+        notes.extend(
+            b.notes
+                .iter()
+                .filter(|note| !a.notes.contains(note))
+                .cloned(),
         );
-        return Err(
-            ContractError::invalid("difference", &b.cited.product.to_string(), reason).into(),
-        );
-    }
-    let (mean_a, mean_b) = (of_side(&a), of_side(&b));
-    let difference = mean_a.mean.zip(mean_b.mean).map(|(a, b)| a - b);
-    let error = welch(&mean_a, &mean_b);
-    let mut notes = a.notes.clone();
-    notes.extend(
-        b.notes
-            .iter()
-            .filter(|note| !a.notes.contains(note))
-            .cloned(),
-    );
-    Ok(Difference {
-        place: a.place.clone(),
-        unit: a.cited.unit.clone(),
-        difference,
-        standard_error: error.map(|(error, _)| error),
-        p_value: error.and_then(|(_, p_value)| p_value),
-        of: side(a, &mean_a),
-        minus: side(b, &mean_b),
-        notes,
+        Ok(Difference {
+            place: a.place.clone(),
+            unit: a.cited.unit.clone(),
+            difference,
+            standard_error: error.map(|(error, _)| error),
+            p_value: error.and_then(|(_, p_value)| p_value),
+            of: side(a, &mean_a),
+            minus: side(b, &mean_b),
+            notes,
+        })
     })
 }
 

@@ -8,6 +8,7 @@ use contract::key::ObjectKey;
 use contract::manifest::Manifest;
 use contract::quantity::Quantity;
 use contract::time::{Period, TimeMs, TimeStep};
+use futures::future::BoxFuture;
 use storage::manifests;
 
 use super::query::budget_of;
@@ -95,57 +96,64 @@ impl Reads {
 ///
 /// # Errors
 /// `UnknownProduct`; `Contract` for a question of several rows or more versions than are summed at once.
-pub async fn history(engine: &Engine, query: &BudgetQuery) -> Result<BudgetHistory, ComputeError> {
-    if query.step != TimeStep::Total || query.parts.is_some() {
-        let reason = "a history is of one number: ask for the total of one region";
-        return Err(contract::ContractError::invalid("step", query.step.as_str(), reason).into());
-    }
-    let published = manifests::published(engine.store(), &query.product).await?;
-    if published.is_empty() {
-        return Err(ComputeError::UnknownProduct {
-            product: query.product.to_string(),
-            known: manifests::products(engine.store()).await?,
-        });
-    }
-    let (version_count, skipped) = (
-        published.len(),
-        published.len().saturating_sub(MOST_VERSIONS),
-    );
-    let mut notes = NOTES.map(str::to_owned).to_vec();
-    if skipped > 0 {
-        notes.push(format!("the {skipped} oldest versions were not looked at"));
-    }
-    let (mut versions, mut before) = (vec![], None);
-    for (number, at) in published.into_iter().skip(skipped) {
-        // Clean-up may have taken it meanwhile.
-        let found = manifests::numbered(engine.store(), &query.product, number).await?;
-        let Some(manifest) = found else { continue };
-        let reads = Reads::of(engine, query, &manifest).await?;
-        if before.as_ref() == Some(&reads) {
-            continue;
-        }
-        if versions.len() >= MOST_SUMMED {
-            let reason = format!(
-                "more than {MOST_SUMMED} versions changed it; ask for a period in the past (from, to), which fewer changed"
+pub fn history<'a>(
+    engine: &'a Engine,
+    query: &'a BudgetQuery,
+) -> BoxFuture<'a, Result<BudgetHistory, ComputeError>> {
+    Box::pin(async move {
+        if query.step != TimeStep::Total || query.parts.is_some() {
+            let reason = "a history is of one number: ask for the total of one region";
+            return Err(
+                contract::ContractError::invalid("step", query.step.as_str(), reason).into(),
             );
-            let name = query.product.as_str();
-            return Err(contract::ContractError::invalid("history", name, reason).into());
         }
-        let change = reads.change_from(before.as_ref());
-        let last = versions
-            .iter()
-            .rev()
-            .find_map(|own: &VersionBudget| own.budget_tg);
-        versions.push(version(engine, query, (&manifest, at), change, last).await?);
-        before = Some(reads);
-    }
-    Ok(BudgetHistory {
-        product: query.product.clone(),
-        region: query.region_name.clone(),
-        unit: "Tg C".to_owned(),
-        version_count: version_count as u64,
-        notes,
-        versions,
+        let published = manifests::published(engine.store(), &query.product).await?;
+        if published.is_empty() {
+            return Err(ComputeError::UnknownProduct {
+                product: query.product.to_string(),
+                known: manifests::products(engine.store()).await?,
+            });
+        }
+        let (version_count, skipped) = (
+            published.len(),
+            published.len().saturating_sub(MOST_VERSIONS),
+        );
+        let mut notes = NOTES.map(str::to_owned).to_vec();
+        if skipped > 0 {
+            notes.push(format!("the {skipped} oldest versions were not looked at"));
+        }
+        let (mut versions, mut before) = (vec![], None);
+        for (number, at) in published.into_iter().skip(skipped) {
+            // Clean-up may have taken it meanwhile.
+            let found = manifests::numbered(engine.store(), &query.product, number).await?;
+            let Some(manifest) = found else { continue };
+            let reads = Reads::of(engine, query, &manifest).await?;
+            if before.as_ref() == Some(&reads) {
+                continue;
+            }
+            if versions.len() >= MOST_SUMMED {
+                let reason = format!(
+                    "more than {MOST_SUMMED} versions changed it; ask for a period in the past (from, to), which fewer changed"
+                );
+                let name = query.product.as_str();
+                return Err(contract::ContractError::invalid("history", name, reason).into());
+            }
+            let change = reads.change_from(before.as_ref());
+            let last = versions
+                .iter()
+                .rev()
+                .find_map(|own: &VersionBudget| own.budget_tg);
+            versions.push(version(engine, query, (&manifest, at), change, last).await?);
+            before = Some(reads);
+        }
+        Ok(BudgetHistory {
+            product: query.product.clone(),
+            region: query.region_name.clone(),
+            unit: "Tg C".to_owned(),
+            version_count: version_count as u64,
+            notes,
+            versions,
+        })
     })
 }
 

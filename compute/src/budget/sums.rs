@@ -7,6 +7,7 @@ use contract::key::ObjectKey;
 use contract::kind::Kind;
 use contract::manifest::{Manifest, ManifestId, Step};
 use contract::time::{Period, TimeMs};
+use futures::future::BoxFuture;
 use serde::{Deserialize, Serialize};
 use storage::{StorageError, Store, document, manifests};
 
@@ -147,50 +148,52 @@ pub(crate) async fn of_steps(
 
 /// Stores the sums of all steps of a version, unless they are there. Those of fields that an earlier version had too
 /// are taken over from it.
-pub async fn store(
-    engine: &Engine,
-    manifest: &Manifest,
-    weights: &RegionKeys,
+pub fn store<'a>(
+    engine: &'a Engine,
+    manifest: &'a Manifest,
+    weights: &'a RegionKeys,
     measure: Measure,
-) -> Result<StoredSums, ComputeError> {
-    let store = engine.store();
-    let key = key(&manifest.id(), weights, measure);
-    let mut known = match stored_rows(store, &key).await? {
-        Stored::Rows(_) => {
-            return Ok(StoredSums {
-                key,
-                computed_count: 0,
-                kept_count: manifest.steps.len(),
-            });
+) -> BoxFuture<'a, Result<StoredSums, ComputeError>> {
+    Box::pin(async move {
+        let store = engine.store();
+        let key = key(&manifest.id(), weights, measure);
+        let mut known = match stored_rows(store, &key).await? {
+            Stored::Rows(_) => {
+                return Ok(StoredSums {
+                    key,
+                    computed_count: 0,
+                    kept_count: manifest.steps.len(),
+                });
+            }
+            Stored::Nothing => earlier_rows(store, manifest, weights, measure).await?,
+            // Nothing else is trusted where one thing was damaged.
+            Stored::Damaged => BTreeMap::new(),
+        };
+        let unknown: Vec<&Step> = manifest
+            .steps
+            .iter()
+            .filter(|step| known.get(&step.field).and_then(Row::sum).is_none())
+            .collect();
+        let computed_count = unknown.len();
+        if computed_count > 0 {
+            let stored = RegionAddress::stored(store, weights.clone());
+            let region = WeighedRegion::read(engine, &manifest.grid, &stored).await?;
+            let sums = asked(engine, manifest, &unknown, &region, measure).await?;
+            known.extend(unknown.iter().zip(sums).map(|(step, sum)| {
+                let row = row_of(&step.field, &sum);
+                (step.field.clone(), row)
+            }));
         }
-        Stored::Nothing => earlier_rows(store, manifest, weights, measure).await?,
-        // Nothing else is trusted where one thing was damaged.
-        Stored::Damaged => BTreeMap::new(),
-    };
-    let unknown: Vec<&Step> = manifest
-        .steps
-        .iter()
-        .filter(|step| known.get(&step.field).and_then(Row::sum).is_none())
-        .collect();
-    let computed_count = unknown.len();
-    if computed_count > 0 {
-        let stored = RegionAddress::stored(store, weights.clone());
-        let region = WeighedRegion::read(engine, &manifest.grid, &stored).await?;
-        let sums = asked(engine, manifest, &unknown, &region, measure).await?;
-        known.extend(unknown.iter().zip(sums).map(|(step, sum)| {
-            let row = row_of(&step.field, &sum);
-            (step.field.clone(), row)
-        }));
-    }
-    let rows = manifest
-        .steps
-        .iter()
-        .filter_map(|step| known.get(&step.field).cloned());
-    put(store, manifest, weights, measure, rows.collect()).await?;
-    Ok(StoredSums {
-        key,
-        computed_count,
-        kept_count: manifest.steps.len() - computed_count,
+        let rows = manifest
+            .steps
+            .iter()
+            .filter_map(|step| known.get(&step.field).cloned());
+        put(store, manifest, weights, measure, rows.collect()).await?;
+        Ok(StoredSums {
+            key,
+            computed_count,
+            kept_count: manifest.steps.len() - computed_count,
+        })
     })
 }
 

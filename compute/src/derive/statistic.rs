@@ -11,6 +11,7 @@ use contract::ContractError;
 use contract::analysis::{MapOptions, MapStatistic};
 use contract::manifest::Manifest;
 use contract::product::ProductId;
+use futures::future::BoxFuture;
 use storage::manifests;
 
 use super::{Progress, commit};
@@ -25,32 +26,36 @@ use plan::Plan;
 ///
 /// # Errors
 /// Steps that it cannot be made of, a target that was not derived from the product, and what reading and writing meet.
-pub async fn derive_statistic(
-    engine: &Engine,
-    product: &ProductId,
-    options: &MapOptions,
-    progress: &Progress<'_>,
-) -> Result<Manifest, ComputeError> {
-    let source = catalogue::product(engine.store(), product).await?;
-    let target = options.target(product)?;
-    let plan = Plan::of(&source, options)?;
-    if let Some(latest) = manifests::latest(engine.store(), &target).await? {
-        let of_it = latest.derived_from.as_ref().map(|from| &from.product);
-        if of_it != Some(product) {
-            let reason = format!(
-                "there is a product of this name that is no statistic of {product}: give another name"
-            );
-            return Err(ContractError::invalid("product", target.as_str(), reason).into());
+pub fn derive_statistic<'a>(
+    engine: &'a Engine,
+    product: &'a ProductId,
+    options: &'a MapOptions,
+    progress: &'a Progress<'a>,
+) -> BoxFuture<'a, Result<Manifest, ComputeError>> {
+    Box::pin(async move {
+        let source = catalogue::product(engine.store(), product).await?;
+        let target = options.target(product)?;
+        let plan = Plan::of(&source, options)?;
+        if let Some(latest) = manifests::latest(engine.store(), &target).await? {
+            let of_it = latest.derived_from.as_ref().map(|from| &from.product);
+            if of_it != Some(product) {
+                let reason = format!(
+                    "there is a product of this name that is no statistic of {product}: give another name"
+                );
+                return Err(ContractError::invalid("product", target.as_str(), reason).into());
+            }
+            if plan.is_up_to_date(&latest, &source) {
+                // Whoever published it may have been killed before the cube followed.
+                cube::keep_up(engine.store(), &latest).await;
+                return Ok(latest);
+            }
         }
-        if plan.is_up_to_date(&latest, &source) {
-            // Whoever published it may have been killed before the cube followed.
-            cube::keep_up(engine.store(), &latest).await;
-            return Ok(latest);
-        }
-    }
-    let derived = match options.statistic {
-        MapStatistic::Anomaly => anomalies::land(engine, &source, &target, &plan, progress).await?,
-        _ => landed::land(engine, &source, &target, &plan, progress).await?,
-    };
-    commit(engine, &source, derived).await
+        let derived = match options.statistic {
+            MapStatistic::Anomaly => {
+                anomalies::land(engine, &source, &target, &plan, progress).await?
+            }
+            _ => landed::land(engine, &source, &target, &plan, progress).await?,
+        };
+        commit(engine, &source, derived).await
+    })
 }

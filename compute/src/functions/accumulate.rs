@@ -17,7 +17,8 @@ use super::lists::{Argument, check_types};
 use crate::objects::Objects;
 use crate::reduce::task::Task;
 
-const NAME: &str = "accumulate";
+/// What queries call it.
+pub(crate) const NAME: &str = "accumulate";
 
 #[derive(Debug, PartialEq, Eq, Hash)]
 pub(super) struct Accumulate {

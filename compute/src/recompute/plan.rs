@@ -8,6 +8,7 @@ use contract::manifest::{Manifest, Step};
 use contract::product::ProductId;
 use contract::quantity::Quantity;
 use contract::time::Period;
+use futures::future::BoxFuture;
 use storage::{Store, manifests, verify};
 
 use super::{Item, Plan, Reason, Request, What};
@@ -17,34 +18,39 @@ use crate::derive::{chosen_start, made_of};
 use crate::{ComputeError, catalogue};
 
 /// What a request comes to. Nothing is written.
-pub async fn plan(store: &Store, request: &Request) -> Result<Plan, ComputeError> {
-    let manifest = catalogue::product(store, &request.product).await?;
-    let (window, _steps) = manifest.steps_inside(request.from, request.to)?;
-    let mut plan = Plan {
-        manifest: manifest.id(),
-        items: vec![],
-        fresh_count: 0,
-        start: None,
-        anew_from: None,
-        is_forced: request.is_forced,
-    };
-    let kinds: BTreeSet<What> = request.what.iter().copied().collect();
-    for what in kinds {
-        match what {
-            What::Fields => fields(store, &manifest, window, request, &mut plan).await?,
-            What::Statistics => tables(store, &manifest, what, request, &mut plan).await?,
-            What::Budget if manifest.quantity == Quantity::CarbonFlux => {
-                tables(store, &manifest, what, request, &mut plan).await?;
-            }
-            What::Budget => {
-                return Err(ComputeError::NotAFlux {
-                    product: manifest.product,
-                    quantity: manifest.quantity,
-                });
+pub fn plan<'a>(
+    store: &'a Store,
+    request: &'a Request,
+) -> BoxFuture<'a, Result<Plan, ComputeError>> {
+    Box::pin(async move {
+        let manifest = catalogue::product(store, &request.product).await?;
+        let (window, _steps) = manifest.steps_inside(request.from, request.to)?;
+        let mut plan = Plan {
+            manifest: manifest.id(),
+            items: vec![],
+            fresh_count: 0,
+            start: None,
+            anew_from: None,
+            is_forced: request.is_forced,
+        };
+        let kinds: BTreeSet<What> = request.what.iter().copied().collect();
+        for what in kinds {
+            match what {
+                What::Fields => fields(store, &manifest, window, request, &mut plan).await?,
+                What::Statistics => tables(store, &manifest, what, request, &mut plan).await?,
+                What::Budget if manifest.quantity == Quantity::CarbonFlux => {
+                    tables(store, &manifest, what, request, &mut plan).await?;
+                }
+                What::Budget => {
+                    return Err(ComputeError::NotAFlux {
+                        product: manifest.product,
+                        quantity: manifest.quantity,
+                    });
+                }
             }
         }
-    }
-    Ok(plan)
+        Ok(plan)
+    })
 }
 
 /// Accumulated fields of the period and, as they follow from these, all after it.

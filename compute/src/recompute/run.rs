@@ -1,6 +1,7 @@
 //! The work of a plan, in its order, each item once.
 
 use contract::manifest::Manifest;
+use futures::future::BoxFuture;
 use storage::manifests;
 
 use super::{Item, Plan, What};
@@ -20,29 +21,31 @@ pub struct Outcome {
 /// Works a plan off. `progress` is told how many items are done.
 ///
 /// Killed at any point, it leaves what readers see as it was; the same request planned again holds what is left.
-pub async fn run(
-    engine: &Engine,
-    plan: &Plan,
-    progress: &(dyn Fn(usize) + Send + Sync),
-) -> Result<Outcome, ComputeError> {
-    let mut outcome = Outcome::default();
-    let fields_count = plan
-        .items
-        .iter()
-        .filter(|item| item.what == What::Fields)
-        .count();
-    if fields_count > 0 {
-        outcome.derived = Some(fields(engine, plan, fields_count, progress).await?);
-        progress(fields_count);
-    }
-    let manifest = manifests::load(engine.store(), &plan.manifest).await?;
-    let tables = plan.items.iter().filter(|item| item.what != What::Fields);
-    for item in tables {
-        table(engine, &manifest, item, plan.is_forced).await?;
-        outcome.tables_count += 1;
-        progress(fields_count + outcome.tables_count);
-    }
-    Ok(outcome)
+pub fn run<'a>(
+    engine: &'a Engine,
+    plan: &'a Plan,
+    progress: &'a (dyn Fn(usize) + Send + Sync),
+) -> BoxFuture<'a, Result<Outcome, ComputeError>> {
+    Box::pin(async move {
+        let mut outcome = Outcome::default();
+        let fields_count = plan
+            .items
+            .iter()
+            .filter(|item| item.what == What::Fields)
+            .count();
+        if fields_count > 0 {
+            outcome.derived = Some(fields(engine, plan, fields_count, progress).await?);
+            progress(fields_count);
+        }
+        let manifest = manifests::load(engine.store(), &plan.manifest).await?;
+        let tables = plan.items.iter().filter(|item| item.what != What::Fields);
+        for item in tables {
+            table(engine, &manifest, item, plan.is_forced).await?;
+            outcome.tables_count += 1;
+            progress(fields_count + outcome.tables_count);
+        }
+        Ok(outcome)
+    })
 }
 
 async fn fields(

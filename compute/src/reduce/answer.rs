@@ -12,6 +12,7 @@ use contract::statistics::{
 use contract::time::Period;
 use cube::Values;
 use cube::scale::Scale;
+use futures::future::BoxFuture;
 
 use super::accumulator::{Accumulated, too_large};
 use super::bins::{BinSums, bin_sums};
@@ -24,53 +25,57 @@ use crate::budget::rows::coverage_percent;
 use crate::{ComputeError, Engine, catalogue};
 
 /// Statistics of the newest version of a product.
-pub async fn statistics(
-    engine: &Engine,
-    query: &StatisticsQuery,
-) -> Result<StatisticsAnswer, ComputeError> {
-    let manifest = catalogue::product(engine.store(), &query.product).await?;
-    statistics_of(engine, query, &manifest, manifest.id()).await
+pub fn statistics<'a>(
+    engine: &'a Engine,
+    query: &'a StatisticsQuery,
+) -> BoxFuture<'a, Result<StatisticsAnswer, ComputeError>> {
+    Box::pin(async move {
+        let manifest = catalogue::product(engine.store(), &query.product).await?;
+        statistics_of(engine, query, &manifest, manifest.id()).await
+    })
 }
 
 /// The same of one version; `id` is its name, which is costly to compute.
-pub async fn statistics_of(
-    engine: &Engine,
-    query: &StatisticsQuery,
-    manifest: &Manifest,
+pub fn statistics_of<'a>(
+    engine: &'a Engine,
+    query: &'a StatisticsQuery,
+    manifest: &'a Manifest,
     id: ManifestId,
-) -> Result<StatisticsAnswer, ComputeError> {
-    let (window, inside) = manifest.steps_inside(query.from, query.to)?;
-    let periods: Vec<Period> = manifest.steps.iter().map(|step| step.period).collect();
-    let bins = query.step.bins(window, periods.iter().copied())?;
-    let weighed = Weighed::of(engine, manifest, query).await?;
-    let first = periods.partition_point(|period| period.end <= window.start);
-    let mut asked = Reduction {
-        engine,
-        manifest,
-        id: &id,
-        values: opened(engine, manifest, &id).await?,
-        weighed: &weighed,
-        steps: first as u32..(first + inside.len()) as u32,
-        scale: Scale::of_all(),
-    };
-    asked.scale = match Scale::of(manifest.quantity) {
-        Some(own) => own,
-        None => asked.own_scale().await?,
-    };
-    let sums = asked.accumulated(wanted(query)).await?;
-    let bins = bin_sums(&periods, &bins, &sums).ok_or_else(too_large)?;
-    let percentiles = asked.percentiles(query, &bins, &periods).await?;
-    let rows = Rows {
-        query,
-        weighed: &weighed,
-        display: manifest.quantity.display(),
-        scale: asked.scale,
-        steps: &periods,
-        percentiles: &percentiles,
-    };
-    let rows = bins.iter().enumerate().map(|(at, bin)| rows.row(at, bin));
-    let rows: Vec<StatisticsRow> = rows.collect();
-    Ok(answer((manifest, id), query, weighed, rows))
+) -> BoxFuture<'a, Result<StatisticsAnswer, ComputeError>> {
+    Box::pin(async move {
+        let (window, inside) = manifest.steps_inside(query.from, query.to)?;
+        let periods: Vec<Period> = manifest.steps.iter().map(|step| step.period).collect();
+        let bins = query.step.bins(window, periods.iter().copied())?;
+        let weighed = Weighed::of(engine, manifest, query).await?;
+        let first = periods.partition_point(|period| period.end <= window.start);
+        let mut asked = Reduction {
+            engine,
+            manifest,
+            id: &id,
+            values: opened(engine, manifest, &id).await?,
+            weighed: &weighed,
+            steps: first as u32..(first + inside.len()) as u32,
+            scale: Scale::of_all(),
+        };
+        asked.scale = match Scale::of(manifest.quantity) {
+            Some(own) => own,
+            None => asked.own_scale().await?,
+        };
+        let sums = asked.accumulated(wanted(query)).await?;
+        let bins = bin_sums(&periods, &bins, &sums).ok_or_else(too_large)?;
+        let percentiles = asked.percentiles(query, &bins, &periods).await?;
+        let rows = Rows {
+            query,
+            weighed: &weighed,
+            display: manifest.quantity.display(),
+            scale: asked.scale,
+            steps: &periods,
+            percentiles: &percentiles,
+        };
+        let rows = bins.iter().enumerate().map(|(at, bin)| rows.row(at, bin));
+        let rows: Vec<StatisticsRow> = rows.collect();
+        Ok(answer((manifest, id), query, weighed, rows))
+    })
 }
 
 /// Which sums are asked for.

@@ -18,9 +18,6 @@ use crate::scan;
 use crate::session::QueryContext;
 use crate::{ComputeError, Engine};
 
-/// Tasks of a question to a cluster, whose room is not known here: they are small, and wait for nothing but room.
-const CLUSTER_TASKS: usize = 32;
-
 /// What some pieces of a question come to.
 pub(super) async fn run(
     engine: &Engine,
@@ -73,11 +70,13 @@ async fn distributed(
 ) -> Result<Accumulated, ComputeError> {
     let keys: BTreeSet<ObjectKey> = pieces.iter().map(|piece| piece.key.clone()).collect();
     let keys: Vec<&ObjectKey> = keys.iter().collect();
-    let tasks = dealt(
-        &question,
-        pieces,
-        engine.partitions().get().max(CLUSTER_TASKS),
-    );
+    let all = Task { question, pieces };
+    // A cluster's scheduler knows its executors, and deals pieces out to them when it plans.
+    let tasks = if engine.has_dealer() {
+        vec![all]
+    } else {
+        all.dealt(engine.partitions().get())
+    };
     let sql = sql(&tasks);
     let job = Digest::of_json(&("statistics", &sql));
     let answered = async {
@@ -86,20 +85,6 @@ async fn distributed(
     };
     let answered = scan::caught(Box::pin(answered)).await;
     scan::or_damaged(engine.store(), &keys, answered).await
-}
-
-/// Pieces as at most `part_count` tasks.
-fn dealt(question: &Question, pieces: Vec<Piece>, part_count: usize) -> Vec<Task> {
-    let part_count = part_count.clamp(1, pieces.len().max(1));
-    let task = |_part| Task {
-        question: question.clone(),
-        pieces: vec![],
-    };
-    let mut tasks: Vec<Task> = (0..part_count).map(task).collect();
-    for (at, piece) in pieces.into_iter().enumerate() {
-        tasks[at % part_count].pieces.push(piece);
-    }
-    tasks
 }
 
 /// The question: each task a part of its own, which gives nothing but what it accumulated to the one that merges them.
@@ -116,7 +101,7 @@ fn sql(tasks: &[Task]) -> String {
 async fn ask(context: QueryContext, sql: &str) -> Result<Vec<RecordBatch>, ComputeError> {
     let failed = || ComputeError::engine("statistics");
     let query = context.sql(sql).await.map_err(failed())?;
-    query.collect().await.map_err(failed())
+    context.collect(query).await.map_err(failed())
 }
 
 /// The one row of an answer.

@@ -29,7 +29,7 @@ pub(crate) struct Task {
 
 impl Task {
     /// As it stands in a query.
-    pub(super) fn text(&self) -> String {
+    pub(crate) fn text(&self) -> String {
         serde_json::to_string(self).expect("it is plain data")
     }
 
@@ -39,6 +39,20 @@ impl Task {
     /// It is none.
     pub(crate) fn of_text(text: &str) -> Result<Self, ComputeError> {
         serde_json::from_str(text).map_err(|e| ComputeError::inconsistent("a task", e))
+    }
+
+    /// Its pieces as at most `count` tasks, none of them idle.
+    pub(crate) fn dealt(self, count: usize) -> Vec<Self> {
+        let count = count.clamp(1, self.pieces.len().max(1));
+        let task = |_part| Self {
+            question: self.question.clone(),
+            pieces: vec![],
+        };
+        let mut tasks: Vec<Self> = (0..count).map(task).collect();
+        for (at, piece) in self.pieces.into_iter().enumerate() {
+            tasks[at % count].pieces.push(piece);
+        }
+        tasks
     }
 
     /// Works on its pieces one after the other.

@@ -7,6 +7,7 @@ use contract::grid::Grid;
 use contract::manifest::Manifest;
 use contract::product::ProductId;
 use contract::region::{AskedRegion, MAX_CORNERS, MAX_REGIONS, Polygon, Region};
+use futures::future::BoxFuture;
 use storage::Store;
 
 use crate::ComputeError;
@@ -25,40 +26,47 @@ pub fn asked(text: &str) -> Option<(ProductId, f32)> {
 ///
 /// # Errors
 /// `Region` if the product has several maps, no cell with the code, or cells too scattered; its field cannot be read.
-pub async fn region(
-    store: &Store,
-    mask: &Manifest,
+pub fn region<'a>(
+    store: &'a Store,
+    mask: &'a Manifest,
     code: f32,
-) -> Result<AskedRegion, ComputeError> {
-    let values = map(store, mask).await?;
-    of_code(mask, &values, code)
+) -> BoxFuture<'a, Result<AskedRegion, ComputeError>> {
+    Box::pin(async move {
+        let values = map(store, mask).await?;
+        of_code(mask, &values, code)
+    })
 }
 
 /// The same of every code of a mask, in the order of codes.
 ///
 /// # Errors
 /// As of one, and more codes than regions are asked for at once.
-pub async fn regions(store: &Store, mask: &Manifest) -> Result<Vec<AskedRegion>, ComputeError> {
-    let values = map(store, mask).await?;
-    let mut codes: Vec<f32> = vec![];
-    for value in values.iter().filter(|value| !value.is_nan()) {
-        if let Err(at) = codes.binary_search_by(|code| code.total_cmp(value)) {
-            codes.insert(at, *value);
+pub fn regions<'a>(
+    store: &'a Store,
+    mask: &'a Manifest,
+) -> BoxFuture<'a, Result<Vec<AskedRegion>, ComputeError>> {
+    Box::pin(async move {
+        let values = map(store, mask).await?;
+        let mut codes: Vec<f32> = vec![];
+        for value in values.iter().filter(|value| !value.is_nan()) {
+            if let Err(at) = codes.binary_search_by(|code| code.total_cmp(value)) {
+                codes.insert(at, *value);
+            }
+            if codes.len() > MAX_REGIONS {
+                return Err(refused(
+                    mask,
+                    &format!("it has more than {MAX_REGIONS} codes"),
+                ));
+            }
         }
-        if codes.len() > MAX_REGIONS {
-            return Err(refused(
-                mask,
-                &format!("it has more than {MAX_REGIONS} codes"),
-            ));
+        if codes.is_empty() {
+            return Err(refused(mask, "no cell has a code"));
         }
-    }
-    if codes.is_empty() {
-        return Err(refused(mask, "no cell has a code"));
-    }
-    codes
-        .iter()
-        .map(|code| of_code(mask, &values, *code))
-        .collect()
+        codes
+            .iter()
+            .map(|code| of_code(mask, &values, *code))
+            .collect()
+    })
 }
 
 /// The one map of a mask, `[row, col]`.

@@ -15,6 +15,7 @@ use contract::manifest::{Manifest, ManifestId};
 use contract::product::ProductId;
 use contract::quantity::Quantity;
 use contract::topic::{Origin, Topic};
+use futures::future::BoxFuture;
 use prometheus::Registry;
 use storage::StorageError;
 use storage::log::{EventLog, Finished, Message, Reader};
@@ -65,12 +66,14 @@ impl Deriver {
     }
 
     /// Reads until asked to stop. What fails for a reason that passes is tried again for ever.
-    pub async fn run(&self, stop: Stop) -> Result<(), ComputeError> {
-        // On the heap: both are large, and whoever waits for this would carry them along.
-        tokio::select! {
-            ended = Box::pin(self.follow_log(&stop)) => ended,
-            never = Box::pin(self.sums.run()) => match never {},
-        }
+    pub fn run(&self, stop: Stop) -> BoxFuture<'_, Result<(), ComputeError>> {
+        Box::pin(async move {
+            // On the heap: both are large, and whoever waits for this would carry them along.
+            tokio::select! {
+                ended = Box::pin(self.follow_log(&stop)) => ended,
+                never = Box::pin(self.sums.run()) => match never {},
+            }
+        })
     }
 
     async fn follow_log(&self, stop: &Stop) -> Result<(), ComputeError> {

@@ -31,6 +31,7 @@ use ballista_executor::health::ExecutorHealth;
 use ballista_executor::metrics::LoggingMetricsCollector;
 use datafusion::execution::memory_pool::FairSpillPool;
 use datafusion::execution::runtime_env::RuntimeEnvBuilder;
+use futures::future::BoxFuture;
 use prometheus::{IntGauge, Registry};
 use retry::Backoff;
 use storage::Store;
@@ -83,51 +84,55 @@ pub struct Executor {
 
 impl Executor {
     /// Takes the address and makes the work folder. The scheduler need not be there.
-    pub async fn start(
-        settings: &ExecutorSettings,
+    pub fn start<'a>(
+        settings: &'a ExecutorSettings,
         store: Store,
-        registry: &Registry,
-    ) -> Result<Self, ComputeError> {
-        let objects = Objects::of(&store);
-        Self::start_over(settings, store, objects, registry).await
+        registry: &'a Registry,
+    ) -> BoxFuture<'a, Result<Self, ComputeError>> {
+        Box::pin(async move {
+            let objects = Objects::of(&store);
+            Self::start_over(settings, store, objects, registry).await
+        })
     }
 
     /// The same, reading objects from somewhere else.
-    pub async fn start_over(
-        settings: &ExecutorSettings,
+    pub fn start_over<'a>(
+        settings: &'a ExecutorSettings,
         store: Store,
         objects: Objects,
-        registry: &Registry,
-    ) -> Result<Self, ComputeError> {
-        let listen = settings.executor_listen;
-        let listener = TcpListener::bind(listen).await.map_err(ComputeError::machine(
+        registry: &'a Registry,
+    ) -> BoxFuture<'a, Result<Self, ComputeError>> {
+        Box::pin(async move {
+            let listen = settings.executor_listen;
+            let listener = TcpListener::bind(listen).await.map_err(ComputeError::machine(
             format!("cannot listen on {listen}; is another executor there? Give another --executor-listen"),
         ))?;
-        let address = listener
-            .local_addr()
-            .map_err(ComputeError::machine("address of the executor"))?;
-        let id = format!("{}-{}", settings.executor_name, new_instance_id());
-        let (work, gone) = WorkFolder::make(&settings.executor_work, &id)?;
-        let work_bytes = IntGauge::new(
-            "fluxglobe_executor_work_bytes",
-            "Intermediate results in the work folder.",
-        )?;
-        registry.register(Box::new(work_bytes.clone()))?;
-        let channel = settings.scheduler.endpoint()?.connect_lazy();
-        tracing::info!(%address, executor = id, tasks = settings.tasks(), "executor");
-        Ok(Self {
-            registration: registration(settings, &id, address),
-            retry_channel: RetryChannel::new(channel.clone(), &id),
-            red: Red::register(registry, "executor")?,
-            settings: settings.clone(),
-            listener,
-            address,
-            work: Arc::new(work),
-            gone,
-            objects: objects.storing(&store),
-            store,
-            channel,
-            work_bytes,
+            let address = listener
+                .local_addr()
+                .map_err(ComputeError::machine("address of the executor"))?;
+            let id = format!("{}-{}", settings.executor_name, new_instance_id());
+            let (work, gone) = WorkFolder::make(&settings.executor_work, &id)?;
+            let work_bytes = IntGauge::new(
+                "fluxglobe_executor_work_bytes",
+                "Intermediate results in the work folder.",
+            )?;
+            registry.register(Box::new(work_bytes.clone()))?;
+            let channel = settings.scheduler.endpoint()?.connect_lazy();
+            tracing::info!(%address, executor = id, tasks = settings.tasks(), "executor");
+            Ok(Self {
+                registration: registration(settings, &id, address),
+                retry_channel: RetryChannel::new(channel.clone(), &id),
+                red: Red::register(registry, "executor")?,
+                settings: settings.clone(),
+                listener,
+                address,
+                work: Arc::new(work),
+                gone,
+                objects: objects.storing(&store),
+                store,
+                channel,
+                work_bytes,
+            })
         })
     }
 
@@ -151,63 +156,66 @@ impl Executor {
 
     /// Works until asked to stop; then takes no more tasks, ends those it has, within the limit of the settings, and
     /// takes its leave of the scheduler, which gives what is left to others.
-    pub async fn run(self, stop: Stop) -> Result<(), ComputeError> {
-        let hands = Arc::new(Semaphore::new(self.settings.tasks()));
-        let nudge = Arc::new(Notify::new());
-        let nudging = keep_asking(
-            Arc::clone(&hands),
-            self.settings.tasks(),
-            Arc::clone(&nudge),
-        );
-        let mut nudging = Background(tokio::spawn(nudging));
-        let mut working = Background(tokio::spawn(poll_loop(
-            SchedulerGrpcClient::new(self.retry_channel.clone())
-                .max_decoding_message_size(state::MESSAGE_BYTES)
-                .max_encoding_message_size(state::MESSAGE_BYTES),
-            Arc::new(self.runner()?),
-            codec(),
-            Some(Arc::clone(&nudge)),
-            Some(Arc::clone(&hands)),
-            ExecutorHealth::new(),
-        )));
-        let mut serving = Background(tokio::spawn(serve(self.listener, Arc::clone(&self.work))));
-        let heart = heartbeat::run(
-            self.channel,
-            self.registration.clone(),
-            self.retry_channel.clone(),
-        );
-        let mut heart = Background(tokio::spawn(heart));
-        let janitor = Janitor {
-            work: Arc::clone(&self.work),
-            work_bytes: self.work_bytes,
-            limit_bytes: self.settings.executor_work_bytes,
-            hands: Arc::clone(&hands),
-        };
-        let mut janitor = Background(tokio::spawn(janitor.run()));
-        let _obituaries = Background(tokio::spawn(tell_gone(
-            self.retry_channel.clone(),
-            self.gone,
-        )));
-        tokio::select! {
-            () = stop.said() => {}
-            ended = &mut serving.0 => return ended_early(ended),
-            ended = &mut working.0 => return ended_early(ended),
-            // These never end but by a panic; without them the executor would look well and be given nothing, or too much.
-            ended = &mut nudging.0 => return ended_early(ended.map(Ok)),
-            ended = &mut heart.0 => return ended_early(ended.map(Ok)),
-            ended = &mut janitor.0 => return ended_early(ended.map(Ok)),
-        }
-        let limit = Duration::from_secs(self.settings.executor_drain_s);
-        drain(&hands, self.settings.tasks(), &self.retry_channel, limit).await;
-        let id = &self.registration.id;
-        if let Err(error) = self
-            .retry_channel
-            .tell_gone(id, "it was asked to stop")
-            .await
-        {
-            tracing::warn!(%error, "left without a word; the scheduler notices by itself");
-        }
-        Ok(())
+    pub fn run(self, stop: Stop) -> BoxFuture<'static, Result<(), ComputeError>> {
+        Box::pin(async move {
+            let hands = Arc::new(Semaphore::new(self.settings.tasks()));
+            let nudge = Arc::new(Notify::new());
+            let nudging = keep_asking(
+                Arc::clone(&hands),
+                self.settings.tasks(),
+                Arc::clone(&nudge),
+            );
+            let mut nudging = Background(tokio::spawn(nudging));
+            let mut working = Background(tokio::spawn(poll_loop(
+                SchedulerGrpcClient::new(self.retry_channel.clone())
+                    .max_decoding_message_size(state::MESSAGE_BYTES)
+                    .max_encoding_message_size(state::MESSAGE_BYTES),
+                Arc::new(self.runner()?),
+                codec(),
+                Some(Arc::clone(&nudge)),
+                Some(Arc::clone(&hands)),
+                ExecutorHealth::new(),
+            )));
+            let mut serving =
+                Background(tokio::spawn(serve(self.listener, Arc::clone(&self.work))));
+            let heart = heartbeat::run(
+                self.channel,
+                self.registration.clone(),
+                self.retry_channel.clone(),
+            );
+            let mut heart = Background(tokio::spawn(heart));
+            let janitor = Janitor {
+                work: Arc::clone(&self.work),
+                work_bytes: self.work_bytes,
+                limit_bytes: self.settings.executor_work_bytes,
+                hands: Arc::clone(&hands),
+            };
+            let mut janitor = Background(tokio::spawn(janitor.run()));
+            let _obituaries = Background(tokio::spawn(tell_gone(
+                self.retry_channel.clone(),
+                self.gone,
+            )));
+            tokio::select! {
+                () = stop.said() => {}
+                ended = &mut serving.0 => return ended_early(ended),
+                ended = &mut working.0 => return ended_early(ended),
+                // These never end but by a panic; without them the executor would look well and be given nothing, or too much.
+                ended = &mut nudging.0 => return ended_early(ended.map(Ok)),
+                ended = &mut heart.0 => return ended_early(ended.map(Ok)),
+                ended = &mut janitor.0 => return ended_early(ended.map(Ok)),
+            }
+            let limit = Duration::from_secs(self.settings.executor_drain_s);
+            drain(&hands, self.settings.tasks(), &self.retry_channel, limit).await;
+            let id = &self.registration.id;
+            if let Err(error) = self
+                .retry_channel
+                .tell_gone(id, "it was asked to stop")
+                .await
+            {
+                tracing::warn!(%error, "left without a word; the scheduler notices by itself");
+            }
+            Ok(())
+        })
     }
 
     fn runner(&self) -> Result<TaskRunner, ComputeError> {

@@ -22,6 +22,7 @@ use tokio::net::TcpListener;
 use tokio::time::Instant;
 
 use super::background::Background;
+use super::dealing::Dealing;
 use super::room::Room;
 use super::scheduler_metrics::QueryMetrics;
 use super::scheduler_watch::Seen;
@@ -76,56 +77,58 @@ pub struct Scheduler {
 
 impl Scheduler {
     /// Takes the address and starts watching executors.
-    pub async fn start(
-        settings: &SchedulerSettings,
+    pub fn start<'a>(
+        settings: &'a SchedulerSettings,
         store: Store,
-        registry: &Registry,
-    ) -> Result<Self, ComputeError> {
-        let listen = settings.scheduler_listen;
-        let listener = TcpListener::bind(listen).await.map_err(ComputeError::machine(
+        registry: &'a Registry,
+    ) -> BoxFuture<'a, Result<Self, ComputeError>> {
+        Box::pin(async move {
+            let listen = settings.scheduler_listen;
+            let listener = TcpListener::bind(listen).await.map_err(ComputeError::machine(
             format!("cannot listen on {listen}; is another scheduler there? Give another --scheduler-listen"),
         ))?;
-        let address = listener
-            .local_addr()
-            .map_err(ComputeError::machine("address of the scheduler"))?;
-        let objects = Objects::of(&store);
-        let seen = Seen::register(registry)?;
-        let config = Arc::new(config(settings, address, &objects, seen.room.clone())?);
-        let failed = || ComputeError::cluster("starting the scheduler");
-        config.validate().map_err(failed())?;
-        let cluster = BallistaCluster::new_from_config(&config)
-            .await
-            .map_err(failed())?;
-        let metrics = Arc::new(QueryMetrics::register(registry)?);
-        let mut server = SchedulerServer::new(
-            address.to_string(),
-            cluster,
-            BallistaCodec::default(),
-            config,
-            metrics,
-        );
-        server.init().await.map_err(failed())?;
-        let changes = server.cluster_state_events().await.map_err(failed())?;
-        let watch = seen
-            .clone()
-            .watch(changes, server.state.executor_manager.clone());
-        let state = Arc::clone(&server.state);
-        let count = seen
-            .clone()
-            .count(move || state.task_manager.get_running_job_cache());
-        let counted = server.clone();
-        tracing::info!(%address, "scheduler");
-        Ok(Self {
-            address,
-            drain: Duration::from_secs(settings.scheduler_drain_s),
-            serving: Box::pin(start_grpc_service_with_listener(listener, server)),
-            query_count: Box::new(move || {
-                counted.pending_job_number() + counted.running_job_number()
-            }),
-            executors: seen.executors,
-            store,
-            watch: Background(tokio::spawn(watch)),
-            count: Background(tokio::spawn(count)),
+            let address = listener
+                .local_addr()
+                .map_err(ComputeError::machine("address of the scheduler"))?;
+            let objects = Objects::of(&store);
+            let seen = Seen::register(registry)?;
+            let config = Arc::new(config(settings, address, &objects, seen.room.clone())?);
+            let failed = || ComputeError::cluster("starting the scheduler");
+            config.validate().map_err(failed())?;
+            let cluster = BallistaCluster::new_from_config(&config)
+                .await
+                .map_err(failed())?;
+            let metrics = Arc::new(QueryMetrics::register(registry)?);
+            let mut server = SchedulerServer::new(
+                address.to_string(),
+                cluster,
+                BallistaCodec::default(),
+                config,
+                metrics,
+            );
+            server.init().await.map_err(failed())?;
+            let changes = server.cluster_state_events().await.map_err(failed())?;
+            let watch = seen
+                .clone()
+                .watch(changes, server.state.executor_manager.clone());
+            let state = Arc::clone(&server.state);
+            let count = seen
+                .clone()
+                .count(move || state.task_manager.get_running_job_cache());
+            let counted = server.clone();
+            tracing::info!(%address, "scheduler");
+            Ok(Self {
+                address,
+                drain: Duration::from_secs(settings.scheduler_drain_s),
+                serving: Box::pin(start_grpc_service_with_listener(listener, server)),
+                query_count: Box::new(move || {
+                    counted.pending_job_number() + counted.running_job_number()
+                }),
+                executors: seen.executors,
+                store,
+                watch: Background(tokio::spawn(watch)),
+                count: Background(tokio::spawn(count)),
+            })
         })
     }
 
@@ -144,26 +147,28 @@ impl Scheduler {
     }
 
     /// Serves until asked to stop; then waits for running queries, within the limit of the settings.
-    pub async fn run(mut self, stop: Stop) -> Result<(), ComputeError> {
-        let (drain, query_count) = (self.drain, self.query_count);
-        let drained = async move {
-            stop.said().await;
-            let begun = Instant::now();
-            while query_count() > 0 && begun.elapsed() < drain {
-                tokio::time::sleep(DRAIN_LOOK).await;
+    pub fn run(mut self, stop: Stop) -> BoxFuture<'static, Result<(), ComputeError>> {
+        Box::pin(async move {
+            let (drain, query_count) = (self.drain, self.query_count);
+            let drained = async move {
+                stop.said().await;
+                let begun = Instant::now();
+                while query_count() > 0 && begun.elapsed() < drain {
+                    tokio::time::sleep(DRAIN_LOOK).await;
+                }
+                let left = query_count();
+                if left > 0 {
+                    tracing::warn!(left, "stopping while queries run; their clients ask again");
+                }
+            };
+            tokio::select! {
+                () = drained => Ok(()),
+                served = self.serving => served.map_err(ComputeError::cluster("serving as scheduler")),
+                // These end by a panic alone; without them nobody would notice lost executors, or scale by what waits.
+                ended = &mut self.watch.0 => watched(ended),
+                ended = &mut self.count.0 => watched(ended),
             }
-            let left = query_count();
-            if left > 0 {
-                tracing::warn!(left, "stopping while queries run; their clients ask again");
-            }
-        };
-        tokio::select! {
-            () = drained => Ok(()),
-            served = self.serving => served.map_err(ComputeError::cluster("serving as scheduler")),
-            // These end by a panic alone; without them nobody would notice lost executors, or scale by what waits.
-            ended = &mut self.watch.0 => watched(ended),
-            ended = &mut self.count.0 => watched(ended),
-        }
+        })
     }
 }
 
@@ -182,8 +187,11 @@ fn config(
     let runtime = state::runtime(objects, state::MEMORY_BYTES)
         .map_err(ComputeError::engine("starting the scheduler"))?;
     let objects = objects.clone();
-    let sessions =
-        move |config| state::session_state(room.fill(config), Arc::clone(&runtime), &objects);
+    let sessions = move |config| {
+        let mut own = state::session_state(room.fill(config), Arc::clone(&runtime), &objects)?;
+        own.add_analyzer_rule(Arc::new(Dealing));
+        Ok(own)
+    };
     Ok(SchedulerConfig {
         scheduler_id: new_instance_id(),
         bind_host: address.ip().to_string(),

@@ -17,6 +17,7 @@ use datafusion::execution::session_state::{SessionState, SessionStateBuilder};
 use datafusion::logical_expr::AggregateUDF;
 use datafusion::physical_plan::execute_stream;
 use datafusion::prelude::SessionConfig;
+use futures::future::BoxFuture;
 use tokio::time::{Instant, timeout_at};
 
 use super::limits::SqlLimits;
@@ -85,8 +86,8 @@ impl Sql {
     ///
     /// # Errors
     /// `Sql`: it makes no sense, or would do more than read; what [`Rows::next`] says.
-    pub async fn ask(&self, text: &str) -> Result<Rows, ComputeError> {
-        self.ask_in_turn(text, None).await
+    pub fn ask<'a>(&'a self, text: &'a str) -> BoxFuture<'a, Result<Rows, ComputeError>> {
+        Box::pin(async move { self.ask_in_turn(text, None).await })
     }
 
     /// The same, holding a turn until the work on it ends.
@@ -109,15 +110,17 @@ impl Sql {
     ///
     /// # Errors
     /// As [`Sql::ask`].
-    pub async fn columns(&self, text: &str) -> Result<SchemaRef, ComputeError> {
-        let deadline = Instant::now() + self.limits.time;
-        let (own, text) = (self.clone(), text.to_owned());
-        let planning = Aborted(tokio::spawn(async move {
-            let (context, tables) = own.context().await?;
-            let frame = own.frame(&context, &tables, &text).await?;
-            Ok(Arc::clone(frame.schema().inner()))
-        }));
-        self.in_time(deadline, planning).await
+    pub fn columns<'a>(&'a self, text: &'a str) -> BoxFuture<'a, Result<SchemaRef, ComputeError>> {
+        Box::pin(async move {
+            let deadline = Instant::now() + self.limits.time;
+            let (own, text) = (self.clone(), text.to_owned());
+            let planning = Aborted(tokio::spawn(async move {
+                let (context, tables) = own.context().await?;
+                let frame = own.frame(&context, &tables, &text).await?;
+                Ok(Arc::clone(frame.schema().inner()))
+            }));
+            self.in_time(deadline, planning).await
+        })
     }
 
     /// Every table there is, and its columns where they are wanted.

@@ -3,6 +3,7 @@
 use contract::cited::Cited;
 use contract::manifest::Manifest;
 use contract::series::{RegionSeries, RegionSeriesQuery, RegionValue};
+use futures::future::BoxFuture;
 
 use crate::budget::Measure;
 use crate::budget::fixed::{AREA_DECIMALS, MASS_DECIMALS};
@@ -11,50 +12,54 @@ use crate::budget::rows::{StepSum, coverage_percent};
 use crate::{ComputeError, Engine, catalogue};
 
 /// The series of a product over a region.
-pub async fn region_series(
-    engine: &Engine,
-    query: &RegionSeriesQuery,
-) -> Result<RegionSeries, ComputeError> {
-    let manifest = catalogue::product(engine.store(), &query.product).await?;
-    region_series_of(engine, query, &manifest).await
+pub fn region_series<'a>(
+    engine: &'a Engine,
+    query: &'a RegionSeriesQuery,
+) -> BoxFuture<'a, Result<RegionSeries, ComputeError>> {
+    Box::pin(async move {
+        let manifest = catalogue::product(engine.store(), &query.product).await?;
+        region_series_of(engine, query, &manifest).await
+    })
 }
 
 /// The same of one version of a product.
-pub async fn region_series_of(
-    engine: &Engine,
-    query: &RegionSeriesQuery,
-    manifest: &Manifest,
-) -> Result<RegionSeries, ComputeError> {
-    let (_window, steps) = manifest.steps_inside(query.from, query.to)?;
-    let area = AskedArea {
-        region: &query.region,
-        earth: query.earth,
-        ocean: query.ocean.as_deref(),
-    };
-    let over = over_region(engine, manifest, &steps, area, Measure::Mean).await?;
-    let (sums, extent) = (over.sums, over.extent);
-    let display = manifest.quantity.display();
-    let value = |sum: &StepSum| {
-        let (mean, area_m2) = mean_and_area(sum);
-        RegionValue {
-            start: sum.period.start,
-            end: sum.period.end,
-            mid: sum.period.mid(),
-            mean: mean.map(|mean| mean * display.factor + display.offset),
-            area_m2,
-            coverage_percent: coverage_percent(m2(sum.sea_area_steps()), extent.ocean_m2),
-        }
-    };
-    let series = sums.steps.iter().map(value).collect();
-    Ok(RegionSeries {
-        cited: Cited::of(manifest, manifest.id()),
-        region: query.region_name.clone(),
-        region_area_m2: extent.area_m2,
-        ocean_area_m2: extent.ocean_m2,
-        ocean_source: over.ocean_source,
-        notes: extent.notes,
-        earth: query.earth,
-        series,
+pub fn region_series_of<'a>(
+    engine: &'a Engine,
+    query: &'a RegionSeriesQuery,
+    manifest: &'a Manifest,
+) -> BoxFuture<'a, Result<RegionSeries, ComputeError>> {
+    Box::pin(async move {
+        let (_window, steps) = manifest.steps_inside(query.from, query.to)?;
+        let area = AskedArea {
+            region: &query.region,
+            earth: query.earth,
+            ocean: query.ocean.as_deref(),
+        };
+        let over = over_region(engine, manifest, &steps, area, Measure::Mean).await?;
+        let (sums, extent) = (over.sums, over.extent);
+        let display = manifest.quantity.display();
+        let value = |sum: &StepSum| {
+            let (mean, area_m2) = mean_and_area(sum);
+            RegionValue {
+                start: sum.period.start,
+                end: sum.period.end,
+                mid: sum.period.mid(),
+                mean: mean.map(|mean| mean * display.factor + display.offset),
+                area_m2,
+                coverage_percent: coverage_percent(m2(sum.sea_area_steps()), extent.ocean_m2),
+            }
+        };
+        let series = sums.steps.iter().map(value).collect();
+        Ok(RegionSeries {
+            cited: Cited::of(manifest, manifest.id()),
+            region: query.region_name.clone(),
+            region_area_m2: extent.area_m2,
+            ocean_area_m2: extent.ocean_m2,
+            ocean_source: over.ocean_source,
+            notes: extent.notes,
+            earth: query.earth,
+            series,
+        })
     })
 }
 

@@ -3,17 +3,22 @@
 use std::time::{Duration, Instant};
 
 use compute::computed::{Request, compute};
+use compute::reduce::statistics;
 use compute::{Engine, budget, derive_accumulated};
 use contract::budget::{BudgetAnswer, BudgetQuery};
+use contract::geometry::{AskedGeometry, Sampling};
+use contract::grid::LonLatDeg;
 use contract::manifest::{Manifest, Step};
 use contract::quantity::Quantity;
 use contract::region::{Polygon, Region};
+use contract::statistics::{StatisticsAnswer, StatisticsQuery};
 use contract::time::{Period, TimeStep};
 use storage::Store;
 
 use crate::computed::{land_inputs, windy};
 use crate::fixture::{ONE_DEGREE, ask, folder_store, land, parts, product, total, wavy_year};
-use crate::node::Cluster;
+use crate::node::{Cluster, LIMIT};
+use crate::statistics::{POLYGON, area, asked};
 
 /// Parts that queries are cut into, whatever the number of executors.
 const PARTS: usize = 8;
@@ -64,29 +69,54 @@ fn questions() -> Vec<BudgetQuery> {
     all
 }
 
-async fn answers(engine: &Engine) -> Vec<BudgetAnswer> {
-    let mut answers = vec![];
+/// Percentiles, which take several passes over the values.
+fn percentiles() -> StatisticsQuery {
+    asked(area(POLYGON), "median,p5,p97.5,mean", TimeStep::Season)
+}
+
+/// Percentiles, extremes with their dates, a line, and a place between four cells.
+fn of_statistics() -> Vec<StatisticsQuery> {
+    let extremes = "min,max,std,count,coverage";
+    let line = AskedGeometry::line("170.5,-33.3;-120.1,12.7;-100,85;80,80").unwrap();
+    let place = LonLatDeg::new(171.3, -40.2).unwrap();
+    let place = AskedGeometry::point(place, Sampling::Bilinear);
+    vec![
+        percentiles(),
+        asked(area("global"), extremes, TimeStep::Month),
+        asked(line, "mean,std,p90,min,max,sum", TimeStep::Year),
+        asked(place, "mean,median,max,coverage", TimeStep::Native),
+    ]
+}
+
+async fn answers(engine: &Engine) -> (Vec<BudgetAnswer>, Vec<StatisticsAnswer>) {
+    let (mut budgets, mut all) = (vec![], vec![]);
     for question in questions() {
-        answers.push(ask(engine, &question).await);
+        budgets.push(ask(engine, &question).await);
     }
-    answers
+    for question in of_statistics() {
+        all.push(statistics(engine, &question).await.unwrap());
+    }
+    (budgets, all)
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn one_two_and_eight_executors_give_the_bits_of_one_process() {
+async fn one_two_and_seven_executors_give_the_bits_of_one_process() {
     let (folder, store) = wavy_store().await;
-    let alone = answers(&Engine::standalone(store.clone(), parts(2))).await;
-    assert_eq!(alone[3].rows.len(), 12);
+    // No plan and no scheduler: the executors' answers are held against those that shared nothing with them but kernels.
+    let alone = answers(&Engine::in_process(store.clone(), parts(2))).await;
+    assert_eq!(alone.0[3].rows.len(), 12);
+    assert!(alone.1[0].rows.iter().all(|row| row.values["p5"].is_some()));
+    assert!(alone.1[1].rows.iter().all(|row| row.found_at.len() == 2));
     let mut cluster = Cluster::start(folder.path());
     let mut derived = vec![];
-    for executor_count in [1, 2, 8] {
+    for executor_count in [1, 2, 7] {
         cluster.add(executor_count - cluster.executors.len(), 0, 0);
         let engine = engine(&store, &cluster);
         engine.ready().await.unwrap();
         let begun = Instant::now();
         assert_eq!(answers(&engine).await, alone, "{executor_count} executors");
         eprintln!(
-            "{executor_count} executors: four budgets in {:?}",
+            "{executor_count} executors: eight questions in {:?}",
             begun.elapsed()
         );
 
@@ -105,19 +135,26 @@ async fn one_two_and_eight_executors_give_the_bits_of_one_process() {
 #[tokio::test(flavor = "multi_thread")]
 async fn an_executor_killed_in_the_middle_is_noticed_and_changes_nothing() {
     let (folder, store) = wavy_store().await;
-    let expected = ask(&Engine::local(store.clone()), &monthly("global")).await;
+    let alone = Engine::local(store.clone());
+    let expected = ask(&alone, &monthly("global")).await;
+    let expected_percentiles = statistics(&alone, &percentiles()).await.unwrap();
     let mut cluster = Cluster::start(folder.path());
     cluster.add(3, 300, 0);
     let engine = engine(&store, &cluster);
-    let asking = tokio::spawn(async move { budget(&engine, &monthly("global")).await });
+    let own = engine.clone();
+    let asking = tokio::spawn(async move { budget(&own, &monthly("global")).await });
+    let of_percentiles = tokio::spawn(async move { statistics(&engine, &percentiles()).await });
     cluster.busy(0);
-    assert!(!asking.is_finished(), "the query was over before the kill");
+    let is_over = asking.is_finished() || of_percentiles.is_finished();
+    assert!(!is_over, "a query was over before the kill");
     let heard = cluster.scheduler.line_count();
     cluster.executors[0].kill();
     let killed = Instant::now();
     let (noticed, _, _) = cluster.scheduler.heard("EXECUTORS 2", heard);
     let notice = noticed - killed;
     assert_eq!(asking.await.unwrap().unwrap(), expected);
+    let found = of_percentiles.await.unwrap().unwrap();
+    assert_eq!(found, expected_percentiles);
     eprintln!(
         "executor lost: noticed after {notice:?}, answered {:?} after the kill",
         killed.elapsed()
@@ -145,6 +182,49 @@ async fn a_scheduler_killed_in_the_middle_is_asked_again_when_it_is_back() {
         "scheduler lost: answered {:?} after the kill",
         killed.elapsed()
     );
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_cluster_that_never_answers_is_given_up_at_the_limit_with_the_reason() {
+    let (folder, store) = wavy_store().await;
+    let cluster = Cluster::start(folder.path());
+    let limit = Duration::from_secs(2);
+    let engine = engine(&store, &cluster).with_query_limit(limit);
+    // Nobody to work on it, and then a scheduler that hangs.
+    for is_frozen in [false, true] {
+        if is_frozen {
+            cluster.scheduler.freeze();
+        }
+        let begun = Instant::now();
+        let asked = tokio::time::timeout(LIMIT, budget(&engine, &monthly("global"))).await;
+        let error = asked.unwrap().unwrap_err();
+        assert!(begun.elapsed() >= limit);
+        assert!(error.is_retryable(), "{error}");
+        let reason = error.to_string();
+        let address = cluster.address.to_string();
+        for said in ["within 2 s", "--cluster-limit-s", address.as_str()] {
+            assert!(reason.contains(said), "{said}: {reason}");
+        }
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_query_that_nobody_waits_for_any_more_is_cancelled() {
+    let (folder, store) = wavy_store().await;
+    let mut cluster = Cluster::start(folder.path());
+    cluster.add(1, 500, 0);
+    let engine = engine(&store, &cluster);
+    let own = engine.clone();
+    let asking = tokio::spawn(async move { budget(&own, &monthly("global")).await });
+    cluster.busy(0);
+    assert!(!asking.is_finished(), "the query was over before the end");
+    asking.abort();
+    let (_, dropped, _) = cluster.scheduler.heard("DROPPED ", 0);
+    assert_eq!(dropped, "1");
+    // Who waits to the end has the answer, and nothing is cancelled.
+    let expected = ask(&Engine::local(store.clone()), &monthly("global")).await;
+    assert_eq!(ask(&engine, &monthly("global")).await, expected);
+    assert_eq!(cluster.scheduler.heard("DROPPED ", 0).1, "1");
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -54,17 +54,28 @@ pub(crate) async fn land(
     grid: Grid,
     steps: &[(Period, Vec<f32>)],
 ) -> Manifest {
+    land_each(store, id, quantity, grid, steps.iter().cloned()).await
+}
+
+/// The same of steps that are made one after the other.
+pub(crate) async fn land_each(
+    store: &Store,
+    id: &ProductId,
+    quantity: Quantity,
+    grid: Grid,
+    steps: impl Iterator<Item = (Period, Vec<f32>)>,
+) -> Manifest {
     let mut cells = vec![false; grid.cell_count()];
     let mut listed = vec![];
-    for (index, (period, values)) in steps.iter().enumerate() {
+    for (index, (period, values)) in steps.enumerate() {
         cells
             .iter_mut()
-            .zip(values)
+            .zip(&values)
             .for_each(|(cell, value)| *cell |= !value.is_nan());
         listed.push(Step {
             masked: None,
-            period: *period,
-            field: fields::write(store, id, &grid, values, *period)
+            period,
+            field: fields::write(store, id, &grid, &values, period)
                 .await
                 .unwrap(),
             raw_sha256: Digest::of(&index.to_le_bytes()),

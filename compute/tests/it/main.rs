@@ -1,6 +1,4 @@
 //! Computations as a whole: products written through the storage crate, answers through Ballista in this process and in others.
-// Questions of questions (a history of budgets with their errors) are futures within futures.
-#![recursion_limit = "256"]
 
 #[cfg(test)]
 mod accumulated;
@@ -42,6 +40,8 @@ mod ocean;
 mod parallel;
 #[cfg(test)]
 mod places;
+#[cfg(test)]
+mod quarter_degree;
 #[cfg(test)]
 mod reading;
 #[cfg(test)]

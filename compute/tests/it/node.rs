@@ -101,12 +101,17 @@ async fn run_scheduler(order: Order, registry: Registry, stop: Stop) {
         .unwrap();
     println!("READY {}", scheduler.address());
     tokio::spawn(async move {
-        let mut shown = String::new();
+        let (mut shown, mut shown_dropped) = (String::new(), 0.0);
         loop {
             let now = gauge(&registry, "fluxglobe_scheduler_executors");
             if now != shown {
                 println!("EXECUTORS {now}");
                 shown = now;
+            }
+            let dropped = dropped_queries(&registry);
+            if dropped > shown_dropped {
+                println!("DROPPED {dropped}");
+                shown_dropped = dropped;
             }
             tokio::time::sleep(Duration::from_millis(20)).await;
         }
@@ -120,6 +125,23 @@ fn gauge(registry: &Registry, name: &str) -> String {
     family.map_or_else(String::new, |family| {
         family.get_metric()[0].get_gauge().get_value().to_string()
     })
+}
+
+/// Queries that ended because nobody waited for them.
+fn dropped_queries(registry: &Registry) -> f64 {
+    let families = registry.gather();
+    let family = families
+        .iter()
+        .find(|family| family.name() == "fluxglobe_scheduler_requests_total");
+    let all = family.map(|family| family.get_metric()).unwrap_or_default();
+    let is_dropped = |metric: &&prometheus::proto::Metric| {
+        let mut labels = metric.get_label().iter();
+        labels.any(|label| label.value() == "dropped")
+    };
+    all.iter()
+        .filter(is_dropped)
+        .map(|metric| metric.get_counter().get_value())
+        .sum()
 }
 
 async fn run_executor(order: Order, registry: Registry, stop: Stop) {
@@ -238,6 +260,13 @@ impl Node {
     pub(crate) fn kill(&mut self) {
         self.child.kill().unwrap();
         self.child.wait().unwrap();
+    }
+
+    /// Stops it in its tracks: it holds its port and answers nobody.
+    pub(crate) fn freeze(&self) {
+        let id = self.child.id().to_string();
+        let stopped = Command::new("kill").args(["-STOP", &id]).status();
+        assert!(stopped.unwrap().success());
     }
 
     /// Asks it to end and waits until it has.

@@ -37,35 +37,42 @@ const GRID: Grid = Grid {
     dlon_deg: 30.0 / 615.0,
 };
 
-/// A store that counts the requests for fields, and the bytes that it hands out of them.
+/// A store that counts the requests for objects of a folder, and the bytes that it hands out of them.
 #[derive(Debug)]
 pub(crate) struct Counting {
     inner: Arc<dyn ObjectStore>,
-    field_bytes: AtomicU64,
-    field_requests: AtomicU64,
+    folder: &'static str,
+    bytes: AtomicU64,
+    requests: AtomicU64,
 }
 
 impl Counting {
+    /// Counts those for fields.
     pub(crate) fn of(inner: Arc<dyn ObjectStore>) -> Self {
+        Self::under(inner, "frames/")
+    }
+
+    pub(crate) fn under(inner: Arc<dyn ObjectStore>, folder: &'static str) -> Self {
         Self {
             inner,
-            field_bytes: AtomicU64::new(0),
-            field_requests: AtomicU64::new(0),
+            folder,
+            bytes: AtomicU64::new(0),
+            requests: AtomicU64::new(0),
         }
     }
 
     pub(crate) fn bytes(&self) -> u64 {
-        self.field_bytes.load(Ordering::Relaxed)
+        self.bytes.load(Ordering::Relaxed)
     }
 
     pub(crate) fn requests(&self) -> u64 {
-        self.field_requests.load(Ordering::Relaxed)
+        self.requests.load(Ordering::Relaxed)
     }
 
     fn count(&self, at: &Path, bytes: u64) {
-        if at.as_ref().contains("frames/") {
-            self.field_bytes.fetch_add(bytes, Ordering::Relaxed);
-            self.field_requests.fetch_add(1, Ordering::Relaxed);
+        if at.as_ref().contains(self.folder) {
+            self.bytes.fetch_add(bytes, Ordering::Relaxed);
+            self.requests.fetch_add(1, Ordering::Relaxed);
         }
     }
 }
@@ -123,10 +130,10 @@ impl ObjectStore for Counting {
     }
 }
 
-/// Four months of noise, which does not compress, with gaps.
-fn noise() -> Vec<(Period, Vec<f32>)> {
+/// Numbers that do not compress, one in five of them no data, kg m⁻² s⁻¹.
+pub(crate) fn random_flux() -> impl FnMut() -> f32 {
     let mut random = 1u64;
-    let mut next = move || {
+    move || {
         random = random
             .wrapping_mul(6_364_136_223_846_793_005)
             .wrapping_add(1);
@@ -136,7 +143,12 @@ fn noise() -> Vec<(Period, Vec<f32>)> {
         } else {
             (share - 0.6) * 1e-8
         }
-    };
+    }
+}
+
+/// Four months of noise with gaps.
+fn noise() -> Vec<(Period, Vec<f32>)> {
+    let mut next = random_flux();
     let mut months = months(2000);
     months.truncate(4);
     let step = |period| (period, (0..GRID.cell_count()).map(|_| next()).collect());

@@ -26,7 +26,8 @@ const GRID: Grid = Grid {
     dlat_deg: 2.5,
     dlon_deg: 2.5,
 };
-const POLYGON: &str = "POLYGON((-60 -33.3,80 -41,120.5 20,33 61,-60 -33.3),(0 0,20 1,20 20,0 0))";
+pub(crate) const POLYGON: &str =
+    "POLYGON((-60 -33.3,80 -41,120.5 20,33 61,-60 -33.3),(0 0,20 1,20 20,0 0))";
 
 async fn landed() -> (tempfile::TempDir, Store, Manifest, Vec<(Period, Vec<f32>)>) {
     let (folder, store) = folder_store();
@@ -35,14 +36,14 @@ async fn landed() -> (tempfile::TempDir, Store, Manifest, Vec<(Period, Vec<f32>)
     (folder, store, manifest, steps)
 }
 
-fn area(region: &str) -> AskedGeometry {
+pub(crate) fn area(region: &str) -> AskedGeometry {
     region
         .parse::<contract::region::AskedRegion>()
         .unwrap()
         .into()
 }
 
-fn asked(geometry: AskedGeometry, statistics: &str, step: TimeStep) -> StatisticsQuery {
+pub(crate) fn asked(geometry: AskedGeometry, statistics: &str, step: TimeStep) -> StatisticsQuery {
     StatisticsQuery {
         statistics: statistics.parse().unwrap(),
         step,

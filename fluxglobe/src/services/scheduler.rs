@@ -1,7 +1,6 @@
 //! `fluxglobe scheduler`: Ballista's scheduler, and the deriver that keeps derived products up with what lands.
 
 use anyhow::Result;
-use compute::Engine;
 use compute::service::{Deriver, Scheduler};
 
 use crate::cli;
@@ -23,8 +22,7 @@ pub(crate) async fn run(settings: &Settings, options: cli::Scheduler) -> Result<
         let readiness = readiness.clone();
         async move { crate::services::worst(readiness.as_ref()).await }
     });
-    let partitions = deployment::least_parts(settings);
-    let engine = Engine::cluster(store, format!("http://{address}").parse()?, partitions);
+    let engine = deployment::cluster(settings, store, &format!("http://{address}"))?;
     let mut parts = context.parts();
     // Executors and clients are served while the log is waited for.
     parts.start("scheduler", scheduler.run(context.stop.clone()));

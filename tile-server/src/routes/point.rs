@@ -1,7 +1,6 @@
 //! `/api/products/{product}/point`: the series of the cell at a place, in the unit people read; or
 //! statistics of it by bins of time.
 
-use axum::Json;
 use axum::extract::State;
 use axum::http::header;
 use axum::response::{IntoResponse as _, Response};
@@ -95,5 +94,9 @@ pub(crate) async fn get(
         PointQuestion::Series(place) => place,
     };
     let series = state.analyses.point(&layer, place).await?;
-    Ok(([(header::CACHE_CONTROL, "no-cache")], Json(series)).into_response())
+    let headers = [
+        (header::CACHE_CONTROL, "no-cache"),
+        (header::CONTENT_TYPE, "application/json"),
+    ];
+    Ok((headers, series).into_response())
 }

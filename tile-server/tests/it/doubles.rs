@@ -220,6 +220,7 @@ pub(crate) struct Analyst {
     pub(crate) budgets: Mutex<Vec<BudgetQuery>>,
     /// Of each budget the number of the version that it is of.
     pub(crate) versions: Mutex<Vec<u64>>,
+    pub(crate) points: Mutex<Vec<LonLatDeg>>,
     pub(crate) areas: Mutex<Vec<RegionSeriesQuery>>,
     pub(crate) statistics: Mutex<Vec<StatisticsQuery>>,
     pub(crate) made: Mutex<Vec<SeriesQuestion>>,
@@ -245,6 +246,7 @@ impl Analyse for Analyst {
         id: &ManifestId,
         place: LonLatDeg,
     ) -> Result<PointSeries, BackendError> {
+        self.points.lock().unwrap().push(place);
         self.mood().apply()?;
         let (row, col) = manifest.cell_inside(place).unwrap();
         let is_sum = manifest.quantity == Quantity::AccumulatedCarbon;

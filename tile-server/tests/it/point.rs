@@ -34,6 +34,29 @@ async fn a_series_is_that_of_the_cell_in_the_unit_people_read() {
 }
 
 #[tokio::test]
+async fn a_place_is_read_once_for_all_who_ask_for_it_and_failures_are_not_remembered() {
+    let app = TestApp::new().await;
+    let asked = || app.analyst.points.lock().unwrap().len();
+    let path = |lon: f64| format!("/api/products/sst/point?lon={lon}&lat=-3.2");
+    app.analyst.set(Mood::fails(Class::Unavailable, "away"));
+    let failed = app.get(&path(12.3)).await;
+    assert_eq!(
+        (failed.status, asked()),
+        (StatusCode::SERVICE_UNAVAILABLE, 1)
+    );
+    app.analyst.set(Mood::Well);
+    let first = app.get(&path(12.3)).await.json();
+    let (here, there) = (path(12.3), path(12.4));
+    let (again, other) = tokio::join!(app.get(&here), app.get(&there));
+    assert_eq!((again.json(), asked()), (first.clone(), 3));
+    // Another place of the same cell is answered with its own coordinates.
+    assert_eq!(other.json()["lon_deg"], json!(12.4));
+    let accumulated = here.replace("sst", "flux-accumulated");
+    assert_ne!(app.get(&accumulated).await.json(), first);
+    assert_eq!(asked(), 4);
+}
+
+#[tokio::test]
 async fn sums_say_how_many_steps_and_how_much_time_they_hold() {
     let app = TestApp::new().await;
     let path = |product: &str| format!("/api/products/{product}/point?lon=12.3&lat=-3.2");

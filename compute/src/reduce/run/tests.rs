@@ -41,6 +41,13 @@ fn pieces(count: u32) -> Vec<Piece> {
     (0..count).map(piece).collect()
 }
 
+fn all(count: u32) -> Task {
+    Task {
+        question: question(),
+        pieces: pieces(count),
+    }
+}
+
 async fn plan(tasks: &[Task]) -> String {
     let engine = Engine::in_process(Store::memory(), NonZeroUsize::new(4).unwrap());
     let sql = format!("EXPLAIN FORMAT INDENT {}", sql(tasks));
@@ -58,7 +65,7 @@ async fn plan(tasks: &[Task]) -> String {
 #[test]
 fn every_piece_is_in_one_task_and_no_task_is_idle() {
     for (pieces_count, parts, expected) in [(9, 4, 4), (2, 7, 2), (1, 1, 1), (0, 5, 1)] {
-        let tasks = dealt(&question(), pieces(pieces_count), parts);
+        let tasks = all(pieces_count).dealt(parts);
         assert_eq!(tasks.len(), expected);
         let mut firsts: Vec<u32> = tasks
             .iter()
@@ -76,7 +83,7 @@ fn every_piece_is_in_one_task_and_no_task_is_idle() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn nothing_but_what_tasks_accumulated_passes_from_part_to_part() {
-    let plan = plan(&dealt(&question(), pieces(9), 4)).await;
+    let plan = plan(&all(9).dealt(4)).await;
     let count = |word: &str| plan.matches(word).count();
     assert_eq!(count("AsyncFuncExec"), 4, "{plan}");
     assert_eq!(
