@@ -21,6 +21,7 @@ mod follow;
 mod keys;
 mod layer;
 mod layout;
+pub mod migrate;
 mod object_storage;
 mod plain;
 mod plan;

@@ -6,6 +6,7 @@ mod damage;
 mod follow;
 mod frozen;
 mod kept;
+mod migrate;
 mod plain;
 mod product;
 mod rivals;

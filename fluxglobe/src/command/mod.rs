@@ -11,6 +11,7 @@ mod gc;
 pub(crate) mod generate;
 mod ingest;
 mod legend;
+mod migrate;
 pub(crate) mod notice;
 mod observations;
 mod products;
@@ -84,6 +85,7 @@ pub(crate) async fn run(settings: &Settings, command: Command) -> Result<ExitCod
         }
         Command::Survey(options) => survey::run(&options).await?,
         Command::Verify(options) => return verify::run(settings, &options).await,
+        Command::Migrate(options) => return migrate::run(settings, &options).await,
         Command::Gc(options) => gc::run(settings, &options).await?,
         Command::Bench(Bench::Stream(options)) => {
             let log = deployment::needed_log(settings, &options.kafka).await?;
