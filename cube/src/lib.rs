@@ -38,6 +38,7 @@ mod unreadable;
 mod values;
 pub mod verify;
 pub mod weight_unit;
+mod windows;
 
 pub use arrays::{Places, places};
 pub use axis::Step;
@@ -56,3 +57,4 @@ pub use record::Record;
 pub use repository::{At, Repository};
 pub use sums::Basis;
 pub use values::{Block, EncodedBlocks, Piece, Undecoded, Values};
+pub use windows::CellAt;
