@@ -9,6 +9,7 @@ mod export;
 mod fill;
 mod flight_sql;
 mod ground;
+mod landing;
 mod look;
 mod observations;
 mod pictures;
@@ -39,6 +40,7 @@ pub(crate) use export::{Export, ExportFormat, ExportedProduct};
 pub(crate) use fill::{BenchFill, FillError, ProductsOf};
 pub(crate) use flight_sql::FlightSql;
 pub(crate) use ground::{Ground, GroundOptions};
+pub(crate) use landing::BenchLanding;
 pub(crate) use look::{Look, RenderLegend};
 pub(crate) use observations::{MatchTime, Matchup, Observations, ObservationsAsked};
 pub(crate) use pictures::{

@@ -97,6 +97,7 @@ pub(crate) async fn run(settings: &Settings, command: Command) -> Result<ExitCod
         Command::Bench(Bench::Fly(options)) => bench::fly::run(&options).await?,
         Command::Bench(Bench::Quality(options)) => bench::quality::run(settings, options).await?,
         Command::Bench(Bench::Compare(options)) => bench::compare::run(&options)?,
+        Command::Bench(Bench::Landing(options)) => bench::landing::run(&options).await?,
         Command::Bench(Bench::Fill(options)) => bench::fill::run(settings, &options)?,
         Command::Adapters(options) => adapters::run(settings, &options)?,
         Command::Generate(options) => generate::run(options)?,
