@@ -12,3 +12,4 @@ mod product;
 mod rivals;
 mod round_trip;
 mod series;
+mod windows;
