@@ -36,6 +36,7 @@ pub mod sql;
 mod standalone;
 mod state;
 pub mod stats;
+mod step_range;
 mod tail_store;
 
 pub use budget::budget;

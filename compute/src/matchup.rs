@@ -8,14 +8,17 @@ mod pair;
 mod scatter;
 pub mod statistics;
 
+use std::sync::Arc;
+
 use contract::ContractError;
 use contract::manifest::{Manifest, ManifestId};
 use contract::observation::Observation;
 use contract::product::ProductId;
 use contract::time::TimeMs;
+use cube::{CellAt, Values};
 use futures::future::BoxFuture;
 use serde::{Deserialize, Serialize};
-use storage::{Store, fields};
+use storage::Store;
 
 use crate::ComputeError;
 use pair::{Pair, Pairing};
@@ -96,7 +99,8 @@ pub struct Matchup {
     pub left_out: LeftOut,
 }
 
-/// Compares observations of one property with a version of a product. Fields are read one at a time.
+/// Compares observations of one property with a version of a product. Of its values the cells that they lie in are read, with what
+/// is stored round them.
 ///
 /// # Errors
 /// Observations of several properties, or in another unit than the product's; a store that does not answer.
@@ -112,16 +116,15 @@ pub fn matchup<'a>(
             mut pairs,
             left_out: mut out,
         } = pair::all(manifest, observations, time_match);
-        // Each field is read once, however many observations fall into it.
-        for (step, step_of_manifest) in manifest.steps.iter().enumerate() {
-            let is_needed = |pair: &Pair| pair.shares.iter().any(|share| share.step == step);
-            if !pairs.iter().any(is_needed) {
-                continue;
-            }
-            let values = fields::read(store, &step_of_manifest.field, &manifest.grid).await?;
-            for pair in &mut pairs {
-                pair.add(step, &values);
-            }
+        // What is read is read once, however many observations fall into it.
+        let cells: Vec<CellAt> = pairs.iter().flat_map(Pair::cells).collect();
+        let values = Values::of(store, &Arc::new(manifest.clone())).await?;
+        let values = values.cells(&cells).await?;
+        let mut values = &values[..];
+        for pair in &mut pairs {
+            let (own, rest) = values.split_at(pair.shares.len());
+            pair.add(own);
+            values = rest;
         }
         let display = manifest.quantity.display();
         let shown = |stored: f64| stored * display.factor + display.offset;

@@ -76,16 +76,30 @@ fn standard_name(description: &Description) -> Option<&'static str> {
     }
 }
 
+/// What values are of their cells and steps; none of an open quantity, for it may be a mean, a code of a mask or an extreme.
+fn cell_methods(quantity: Quantity) -> Option<&'static str> {
+    match quantity {
+        Quantity::AccumulatedCarbon => Some("area: mean time: sum"),
+        // They hold at any time.
+        Quantity::Elevation | Quantity::SeaAreaFraction | Quantity::LandAreaFraction => {
+            Some("area: mean")
+        }
+        Quantity::Open(_) => None,
+        _ => Some("area: mean time: mean"),
+    }
+}
+
 /// What is said of the values.
 pub fn of_values(description: &Description) -> Map<String, Value> {
     let quantity = description.quantity;
-    let is_sum = quantity == Quantity::AccumulatedCarbon;
     let mut attributes = attributes(json!({
         "long_name": quantity.title(),
         "units": quantity.unit(),
-        "cell_methods": if is_sum { "area: mean time: sum" } else { "area: mean time: mean" },
         "grid_mapping": "crs",
     }));
+    if let Some(methods) = cell_methods(quantity) {
+        attributes.insert("cell_methods".to_owned(), methods.into());
+    }
     if let Some(name) = standard_name(description) {
         attributes.insert("standard_name".to_owned(), name.into());
     }
@@ -167,5 +181,12 @@ mod tests {
         assert_eq!(variable(Quantity::CarbonFlux), "carbon_flux");
         let open = Quantity::open("time", "1", "Time").unwrap();
         assert_eq!(variable(open), "time_values");
+        // Nobody knows what those of others are.
+        assert_eq!(cell_methods(open), None);
+        assert_eq!(cell_methods(Quantity::Elevation), Some("area: mean"));
+        let with_time = Quantity::ALL.map(cell_methods);
+        let count = |words| with_time.iter().filter(|it| **it == Some(words)).count();
+        assert_eq!(count("area: mean"), 3);
+        assert_eq!(count("area: mean time: sum"), 1);
     }
 }

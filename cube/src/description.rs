@@ -42,6 +42,11 @@ pub struct Description {
 impl Description {
     /// The description of a version of a product.
     pub fn of(manifest: &Manifest) -> Self {
+        Self::named(manifest, manifest.id())
+    }
+
+    /// The same for who knows the version's name, which takes longer to compute the more steps there are.
+    pub(crate) fn named(manifest: &Manifest, version: ManifestId) -> Self {
         Self {
             product: manifest.product.clone(),
             title: manifest.title.clone(),
@@ -49,7 +54,7 @@ impl Description {
             synthetic: manifest.synthetic,
             source: manifest.source.clone(),
             grid: manifest.grid,
-            version: Some(manifest.id()),
+            version: Some(version),
         }
     }
 

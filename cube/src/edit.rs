@@ -163,7 +163,25 @@ impl<'a> Edit<'a> {
         plan: &Plan,
         message: &str,
     ) -> Result<Option<String>, CubeError> {
-        let layer = Layer {
+        self.layer(state, plan).commit(message).await
+    }
+
+    /// Commits a plan over a state as a state of its own, which nothing leads to before it is named.
+    pub(crate) async fn lay_beside(
+        &self,
+        state: &State,
+        plan: &Plan,
+        message: &str,
+    ) -> Result<String, CubeError> {
+        let mut layer = self.layer(state, plan);
+        layer.is_beside = true;
+        // Nobody else changes it.
+        let committed = layer.commit(message).await?;
+        committed.ok_or_else(|| self.contended())
+    }
+
+    fn layer<'b>(&'b self, state: &'b State, plan: &'b Plan) -> Layer<'b> {
+        Layer {
             repository: self.repository,
             description: &self.description,
             indices: self.encoder.indices(),
@@ -171,8 +189,8 @@ impl<'a> Edit<'a> {
             state,
             plan,
             staged: &self.staged,
-        };
-        layer.commit(message).await
+            is_beside: false,
+        }
     }
 
     pub(crate) fn staged(&self) -> &AllStaged {

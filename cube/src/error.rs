@@ -45,6 +45,18 @@ pub enum CubeError {
         "step {period} of {array} does not hold the values of its digest: land its file again, or restore it from a copy"
     )]
     Step { array: String, period: Period },
+    /// The cube of a version does not hold what the version's fields do.
+    #[error(
+        "{array} of {version} in {place} is not what its fields are: {reason}; the fields are untouched and stay what is true: \
+         remove this folder, and the cube is made anew from them"
+    )]
+    Differs {
+        place: String,
+        array: String,
+        version: String,
+        /// Step and cell, and both values.
+        reason: String,
+    },
     /// A step would cover a part of the period of another one.
     #[error("the step {step} overlaps {there}, which is there: one period has one step")]
     Overlap { step: Period, there: Period },
@@ -83,6 +95,7 @@ impl CubeError {
             | Self::Foreign { .. }
             | Self::Chunk { .. }
             | Self::Step { .. }
+            | Self::Differs { .. }
             | Self::Overlap { .. }
             | Self::Shape { .. }
             | Self::Outside { .. }

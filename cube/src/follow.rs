@@ -117,7 +117,7 @@ impl Follower<'_> {
     pub fn run<'a>(&'a self, manifest: &'a Manifest) -> BoxFuture<'a, Result<Followed, CubeError>> {
         Box::pin(async move {
             let version = manifest.id();
-            let description = Description::of(manifest);
+            let description = Description::named(manifest, version.clone());
             let repository = Repository::for_change(self.store, self.folder, &description).await?;
             let mut edit = Edit::describing(&repository, description.clone()).await?;
             for _attempt in 0..ATTEMPTS {
@@ -128,18 +128,7 @@ impl Follower<'_> {
                         put_count: edit.staged().len(),
                     });
                 }
-                let before: &[Step] = if state.describes_same_cells(&description) {
-                    &state.steps
-                } else {
-                    &[]
-                };
-                let wanted = self.wanted(manifest, &state, before, &mut edit).await?;
-                let plan = Plan::exactly(&wanted, before, edit.staged());
-                let plan = plan.map_err(|missing| CubeError::Foreign {
-                    place: repository.place.clone(),
-                    array: "time".to_owned(),
-                    reason: format!("steps of {missing:?} are neither there nor put"),
-                })?;
+                let plan = self.plan(manifest, &description, &state, &mut edit).await?;
                 let committed = edit.lay(&state, &plan, &version.to_string()).await?;
                 if let Some(snapshot) = committed {
                     let tag = version.number.to_string();
@@ -151,6 +140,59 @@ impl Follower<'_> {
                 }
             }
             Err(edit.contended())
+        })
+    }
+
+    /// The same as [`Follower::run`], and an older version than the cube is of gets its name too, if it has none: its state is
+    /// made beside the newest one, which stays what it is, and shares with it the steps that both hold.
+    ///
+    /// Killed before it is named, such a state is nothing that anybody finds; clean-up removes it.
+    ///
+    /// # Errors
+    /// As [`Follower::run`].
+    pub async fn keep(&self, manifest: &Manifest) -> Result<Followed, CubeError> {
+        let followed = self.run(manifest).await?;
+        let tag = manifest.number.to_string();
+        if followed.version.number <= manifest.number {
+            return Ok(followed);
+        }
+        let version = manifest.id();
+        let message = version.to_string();
+        let description = Description::named(manifest, version);
+        let repository = Repository::for_change(self.store, self.folder, &description).await?;
+        if repository.has_tag(&tag).await {
+            return Ok(followed);
+        }
+        let mut edit = Edit::describing(&repository, description.clone()).await?;
+        let state = State::newest(&repository).await?;
+        let plan = self.plan(manifest, &description, &state, &mut edit).await?;
+        let snapshot = edit.lay_beside(&state, &plan, &message).await?;
+        repository.tag(&tag, &snapshot).await?;
+        Ok(Followed {
+            version: followed.version,
+            put_count: edit.staged().len(),
+        })
+    }
+
+    /// Where each step of a version comes from over a state; those that are not in it are put.
+    async fn plan(
+        &self,
+        manifest: &Manifest,
+        description: &Description,
+        state: &State,
+        edit: &mut Edit<'_>,
+    ) -> Result<Plan, CubeError> {
+        let before: &[Step] = if state.describes_same_cells(description) {
+            &state.steps
+        } else {
+            &[]
+        };
+        let wanted = self.wanted(manifest, state, before, edit).await?;
+        let plan = Plan::exactly(&wanted, before, edit.staged());
+        plan.map_err(|missing| CubeError::Foreign {
+            place: self.folder.to_owned(),
+            array: "time".to_owned(),
+            reason: format!("steps of {missing:?} are neither there nor put"),
         })
     }
 

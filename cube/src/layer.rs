@@ -30,6 +30,8 @@ pub(crate) struct Layer<'a> {
     pub(crate) state: &'a State,
     pub(crate) plan: &'a Plan,
     pub(crate) staged: &'a AllStaged,
+    /// Is the new state made beside the newest one, which stays what it is?
+    pub(crate) is_beside: bool,
 }
 
 impl Layer<'_> {
@@ -71,11 +73,13 @@ impl Layer<'_> {
         let properties = description.version.as_ref().map(|version| {
             BTreeMap::from([("version".to_owned(), Value::from(version.to_string()))])
         });
-        let committed = session
+        let mut commit = session
             .commit(message)
-            .properties(properties.unwrap_or_default())
-            .execute();
-        match committed.await {
+            .properties(properties.unwrap_or_default());
+        if self.is_beside {
+            commit = commit.anonymous();
+        }
+        match commit.execute().await {
             Ok(snapshot) => Ok(Some(snapshot.to_string())),
             Err(error) if matches!(error.kind, SessionErrorKind::Conflict { .. }) => {
                 tracing::debug!(place = %self.repository.place, "others committed before");

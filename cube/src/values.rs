@@ -308,6 +308,45 @@ impl Values {
         })
     }
 
+    /// Values of some windows of cells of one step, `[row, col]` of each, in the order asked: of its map-major chunks those that
+    /// they touch, each once; the whole field where the cube does not have the step.
+    ///
+    /// # Errors
+    /// As [`Values::cell`].
+    pub async fn windows(
+        &self,
+        step: usize,
+        windows: &[Window],
+    ) -> Result<Vec<Vec<f32>>, CubeError> {
+        let Inner {
+            store,
+            manifest,
+            places,
+            cubes,
+        } = &*self.0;
+        match places.get(step) {
+            None => Err(self.outside(&format!("step {step}"))),
+            Some(Place::Cube { cube, step }) => cubes[*cube].windows(*step, windows).await,
+            Some(Place::Field) => {
+                let grid = &manifest.grid;
+                for window in windows {
+                    let Window { row, col, .. } = *window;
+                    if row.saturating_add(window.rows) > grid.rows
+                        || col.saturating_add(window.cols) > grid.cols
+                    {
+                        return Err(self.outside(&format!("{window:?}")));
+                    }
+                }
+                let values = fields::read(store, &manifest.steps[step].field, grid).await?;
+                let of = |window: &Window| {
+                    let own = window.cell_indices(grid);
+                    own.map(|index| values[index]).collect()
+                };
+                Ok(windows.iter().map(of).collect())
+            }
+        }
+    }
+
     /// Blocks of a run of steps as they are stored, where the time-major copy holds all of these steps; they are decoded one
     /// after the other, and none of them is copied. None where it does not.
     ///

@@ -9,6 +9,7 @@ mod export;
 mod fill;
 mod flight_sql;
 mod ground;
+mod landing;
 mod look;
 mod observations;
 mod pictures;
@@ -39,6 +40,7 @@ pub(crate) use export::{Export, ExportFormat, ExportedProduct};
 pub(crate) use fill::{BenchFill, FillError, ProductsOf};
 pub(crate) use flight_sql::FlightSql;
 pub(crate) use ground::{Ground, GroundOptions};
+pub(crate) use landing::BenchLanding;
 pub(crate) use look::{Look, RenderLegend};
 pub(crate) use observations::{MatchTime, Matchup, Observations, ObservationsAsked};
 pub(crate) use pictures::{
@@ -52,7 +54,7 @@ pub(crate) use show::settings as shown_settings;
 pub(crate) use sql::{SqlFormat, SqlQuestion};
 pub(crate) use statistics::{StatisticsOptions, Stats, StatsLine, StatsPoint, StatsPolygon};
 pub(crate) use surroundings::Surroundings;
-pub(crate) use upkeep::{Gc, Recompute, RecomputeWhat, Survey, Verify};
+pub(crate) use upkeep::{Gc, Migrate, Recompute, RecomputeWhat, Survey, Verify};
 
 /// See and count the ocean's carbon.
 ///
@@ -192,6 +194,8 @@ pub(crate) enum Command {
     Recompute(Recompute),
     /// Read every stored object and compare it with its name or seal; the exit code is 1 if one is damaged or missing.
     Verify(Verify),
+    /// Bring a store of before over: a cube for every product and kept version, compared with its fields bit by bit.
+    Migrate(Migrate),
     /// Remove objects that no kept version needs.
     Gc(Gc),
     /// Show what would become of files: landed with which profile, or refused and why. Nothing is stored.

@@ -18,6 +18,9 @@ use crate::{StorageError, Store, document, fields};
 
 pub use published::{AtInstant, as_of, published};
 
+/// Versions that were published since the last look, up to which each is asked for.
+const MOST_ASKED: u64 = 16;
+
 /// Products that have a manifest, sorted by name.
 pub async fn products(store: &Store) -> Result<Vec<ProductId>, StorageError> {
     let names = store.folders(Kind::Manifest.folder()).await?;
@@ -29,13 +32,7 @@ pub async fn products(store: &Store) -> Result<Vec<ProductId>, StorageError> {
 /// Where this process has seen one before, the next number is asked for and nothing is listed.
 pub async fn latest(store: &Store, product: &ProductId) -> Result<Option<Manifest>, StorageError> {
     if let Some(known) = store.newest.get(product) {
-        let mut newest = known;
-        while store
-            .exists(&ObjectKey::manifest(product, newest + 1))
-            .await?
-        {
-            newest += 1;
-        }
+        let newest = follow(store, product, known).await?;
         if let Some(manifest) = numbered(store, product, newest).await? {
             store.newest.insert(product.clone(), newest);
             return Ok(Some(manifest));
@@ -48,6 +45,42 @@ pub async fn latest(store: &Store, product: &ProductId) -> Result<Option<Manifes
     };
     store.newest.insert(product.clone(), newest);
     numbered(store, product, newest).await
+}
+
+/// The newest manifest of a product if it is newer than the number that the caller knows: one small request where it is not.
+///
+/// That the one it knows is still there is not asked; see [`is_there`].
+pub async fn newer(
+    store: &Store,
+    product: &ProductId,
+    known: u64,
+) -> Result<Option<Manifest>, StorageError> {
+    let newest = follow(store, product, known).await?;
+    if newest == known {
+        return Ok(None);
+    }
+    store.newest.insert(product.clone(), newest);
+    numbered(store, product, newest).await
+}
+
+/// Is the manifest of a number there?
+pub async fn is_there(
+    store: &Store,
+    product: &ProductId,
+    number: u64,
+) -> Result<bool, StorageError> {
+    store.exists(&ObjectKey::manifest(product, number)).await
+}
+
+/// The last number of those that follow a known one: each is asked for, up to some, behind which it is faster to list.
+async fn follow(store: &Store, product: &ProductId, known: u64) -> Result<u64, StorageError> {
+    for newest in known..known + MOST_ASKED {
+        if !is_there(store, product, newest + 1).await? {
+            return Ok(newest);
+        }
+    }
+    let last = numbers(store, product).await?.pop();
+    Ok(last.map_or(known, |last| last.max(known)))
 }
 
 /// Numbers of the manifests that a product has, ascending.

@@ -20,6 +20,7 @@ mod read;
 mod retry_store;
 mod settings;
 mod swap;
+mod traffic;
 
 use std::fmt::{Debug, Formatter};
 use std::path::{Path as FilePath, PathBuf};
@@ -42,6 +43,7 @@ use crate::StorageError;
 pub use self::leftovers::Leftover;
 pub use self::settings::{RetryLimits, Settings};
 pub use self::swap::Seen;
+pub use self::traffic::{Counts, Traffic};
 
 /// Largest object: a field of the largest grid is 1 GiB uncompressed.
 const MAX_OBJECT_BYTES: u64 = 2 << 30;
@@ -63,6 +65,8 @@ pub struct Store {
     place: Place,
     retry_limits: RetryLimits,
     checked: Arc<Checked>,
+    /// Where requests are counted, if they are.
+    traffic: Option<Arc<Traffic>>,
     /// Pages of manifests that were read.
     pub(crate) pages: Arc<HeldPages>,
     /// The newest numbers of manifests that were seen.
@@ -130,6 +134,7 @@ impl Store {
             place: Place::Memory,
             retry_limits: RetryLimits::default(),
             checked: Arc::default(),
+            traffic: None,
             pages: Arc::default(),
             newest: Arc::default(),
         }
@@ -151,6 +156,7 @@ impl Store {
             place: Place::Folder(root),
             retry_limits: RetryLimits::default(),
             checked: Arc::default(),
+            traffic: None,
             pages: Arc::default(),
             newest: Arc::default(),
         })
@@ -172,6 +178,7 @@ impl Store {
             place,
             retry_limits,
             checked: Arc::default(),
+            traffic: None,
             pages: Arc::default(),
             newest: Arc::default(),
         })

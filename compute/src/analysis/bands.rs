@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use contract::analysis::Along;
+use contract::chunk::Window;
 use contract::earth::Earth;
 use contract::grid::Grid;
 
@@ -96,25 +97,47 @@ impl Bands {
         &self.edges_deg
     }
 
-    /// Sums of a field over each band: `values` are `[row, col]`, NaN no data, any unit. In the order of rows, so that the same
-    /// field has the same bits.
-    pub fn sums(&self, values: &[f32]) -> Vec<BandSum> {
+    /// The cells of all bands: all rows of them, and the columns that lie side by side, west to east.
+    pub fn windows(&self) -> Vec<Window> {
+        let mut runs: Vec<Range<u32>> = vec![];
+        for (col, is_inside) in (0..).zip(&self.cols) {
+            match runs.last_mut() {
+                _ if !is_inside => {}
+                Some(run) if run.end == col => run.end += 1,
+                _ => runs.push(col..col + 1),
+            }
+        }
+        let window = |cols: Range<u32>| Window {
+            row: self.rows.start,
+            col: cols.start,
+            rows: self.rows.end - self.rows.start,
+            cols: cols.end - cols.start,
+        };
+        let windows = runs.into_iter().map(window);
+        windows.filter(|window| window.rows > 0).collect()
+    }
+
+    /// Sums of a field over each band: `values` are `[row, col]` of each of [`Bands::windows`], NaN no data, any unit. In the order
+    /// of rows and of columns in each, so that the same field has the same bits.
+    pub fn sums(&self, windows: &[Window], values: &[Vec<f32>]) -> Vec<BandSum> {
         let mut sums = vec![BandSum::default(); self.edges_deg.len()];
-        let width = self.cols.len();
         for row in self.rows.clone() {
             let area_m2 = self.area_m2[row as usize];
-            let cells = &values[row as usize * width..][..width];
-            for (col, value) in cells.iter().enumerate() {
-                if value.is_nan() || !self.cols[col] {
-                    continue;
-                }
-                let at = match self.along {
-                    Along::Lat => row as usize,
-                    Along::Lon => col,
-                };
-                if let Some(sum) = self.band_of[at].and_then(|band| sums.get_mut(band)) {
-                    sum.weighted += area_m2 * f64::from(*value);
-                    sum.area_m2 += area_m2;
+            for (window, values) in windows.iter().zip(values) {
+                let start = (row - window.row) as usize * window.cols as usize;
+                let cells = &values[start..start + window.cols as usize];
+                for (col, value) in (window.col as usize..).zip(cells) {
+                    if value.is_nan() {
+                        continue;
+                    }
+                    let at = match self.along {
+                        Along::Lat => row as usize,
+                        Along::Lon => col,
+                    };
+                    if let Some(sum) = self.band_of[at].and_then(|band| sums.get_mut(band)) {
+                        sum.weighted += area_m2 * f64::from(*value);
+                        sum.area_m2 += area_m2;
+                    }
                 }
             }
         }
@@ -135,6 +158,14 @@ mod tests {
         dlon_deg: 1.0,
     };
 
+    /// Sums of a whole field.
+    fn sums(bands: &Bands, values: &[f32]) -> Vec<BandSum> {
+        let windows = bands.windows();
+        let of = |window: &Window| window.cell_indices(&GRID).map(|at| values[at]).collect();
+        let values: Vec<Vec<f32>> = windows.iter().map(of).collect();
+        bands.sums(&windows, &values)
+    }
+
     #[test]
     fn bands_are_area_weighted_means_of_the_cells_in_them() {
         let values: Vec<f32> = (0..24)
@@ -148,7 +179,7 @@ mod tests {
             Earth::Sphere,
         );
         assert_eq!(bands.edges_deg(), [(-2.0, 0.0), (0.0, 2.0)]);
-        let sums = bands.sums(&values);
+        let sums = sums(&bands, &values);
         // Rows 0 and 1 of the sphere: areas as sin 2 - sin 1 and sin 1 - sin 0.
         let area = |north: f64| north.to_radians().sin() - (north - 1.0).to_radians().sin();
         let [a, b] = [area(2.0), area(1.0)];
@@ -170,8 +201,29 @@ mod tests {
         );
         assert_eq!(bands.edges_deg()[0], (178.0, 179.0));
         assert_eq!(bands.edges_deg().len(), 4);
-        let means: Vec<f64> = bands
-            .sums(&values)
+        // Cut at the edge of the grid alone.
+        let cells = |cols: &[(u32, u32)]| -> Vec<Window> {
+            let window = |&(col, cols): &(u32, u32)| Window {
+                row: 1,
+                col,
+                rows: 2,
+                cols,
+            };
+            cols.iter().map(window).collect()
+        };
+        assert_eq!(bands.windows(), cells(&[(1, 4)]));
+        let across = |west: f64| {
+            let global = Grid {
+                cols: 360,
+                west_deg: -180.0,
+                ..GRID
+            };
+            let bounds = [west, -1.0, west + 4.0, 1.0];
+            Bands::of(&global, Along::Lat, 1.0, bounds, Earth::Wgs84).windows()
+        };
+        assert_eq!(across(178.0), cells(&[(0, 2), (358, 2)]));
+        assert_eq!(across(10.0), cells(&[(190, 4)]));
+        let means: Vec<f64> = sums(&bands, &values)
             .iter()
             .map(|s| s.weighted / s.area_m2)
             .collect();
@@ -188,6 +240,6 @@ mod tests {
             [0.0, 50.0, 10.0, 60.0],
             Earth::Wgs84,
         );
-        assert!(nowhere.edges_deg().is_empty() && nowhere.sums(&values).is_empty());
+        assert!(nowhere.edges_deg().is_empty() && sums(&nowhere, &values).is_empty());
     }
 }

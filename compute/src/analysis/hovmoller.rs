@@ -4,29 +4,30 @@ use std::sync::Arc;
 
 use contract::ContractError;
 use contract::analysis::{Along, Hovmoller, HovmollerBand, HovmollerQuery, HovmollerRow};
+use contract::chunk::Window;
 use contract::cited::Cited;
 use contract::grid::Grid;
 use contract::manifest::{Manifest, Step};
 use contract::time::Period;
+use cube::Values;
+use futures::TryStreamExt as _;
 use futures::future::BoxFuture;
-use futures::{StreamExt as _, TryStreamExt as _};
-use storage::{Store, domain, fields};
+use storage::{Store, domain};
 
 use super::bands::{BandSum, Bands};
 use super::read::Version;
 use super::timeline::{bins_over, no_shorter};
 use crate::ComputeError;
+use crate::step_range::step_range;
 
 /// Means in one answer: 5 MiB as text.
 const MOST_MEANS: usize = 400_000;
-/// Fields that are read at the same time: one is decoded while another comes.
-const FIELDS_AT_ONCE: usize = 2;
 /// Heights of bands that are chosen where nobody chose one, degrees.
 const BANDS_DEG: [f64; 4] = [1.0, 2.0, 5.0, 10.0];
 
 /// The means of bands of a version of a product against time.
 ///
-/// Fields are read one after the other, two at a time. Each counts by area and time: the mean of a month is that of all its
+/// Of each step the cells inside the bounds are read, with what is stored round them. Each counts by area and time: the mean of a month is that of all its
 /// cells with data over all its time, so that a cell that is seen once counts by the step that saw it.
 ///
 /// # Errors
@@ -156,11 +157,12 @@ async fn domain_areas(
             "it does not fill its product's grid",
         ));
     }
-    let ones: Vec<f32> = cells
-        .iter()
-        .map(|held| if *held { 1.0 } else { f32::NAN })
-        .collect();
-    Ok(bands.sums(&ones).iter().map(|sum| sum.area_m2).collect())
+    let windows = bands.windows();
+    let one = |cell: usize| if cells[cell] { 1.0 } else { f32::NAN };
+    let ones = |window: &Window| window.cell_indices(&manifest.grid).map(one).collect();
+    let ones: Vec<Vec<f32>> = windows.iter().map(ones).collect();
+    let sums = bands.sums(&windows, &ones);
+    Ok(sums.iter().map(|sum| sum.area_m2).collect())
 }
 
 /// Sums of each bin and band, by area and seconds.
@@ -171,20 +173,20 @@ async fn sums_in(
     bands: &Arc<Bands>,
     bins: &[Period],
 ) -> Result<Vec<Vec<BandSum>>, ComputeError> {
-    let of_step = |step: &Step| {
-        let (period, field, bands) = (step.period, step.field.clone(), Arc::clone(bands));
-        async move {
-            let values = fields::read(store, &field, &manifest.grid).await?;
-            let sums = tokio::task::spawn_blocking(move || bands.sums(&values)).await;
-            let sums = sums.map_err(|e| ComputeError::inconsistent(field.to_string(), e))?;
-            Ok::<_, ComputeError>((period, sums))
-        }
-    };
-    let read: Vec<_> = steps.iter().map(|step| of_step(step)).collect();
-    let mut read = futures::stream::iter(read).buffered(FIELDS_AT_ONCE);
+    let windows = bands.windows();
+    let values = Values::of(store, &Arc::new(manifest.clone())).await?;
+    let range = step_range(manifest, steps)?;
+    let mut read = std::pin::pin!(values.each(range, &windows));
     let mut all = vec![vec![BandSum::default(); bands.edges_deg().len()]; bins.len()];
     // In the order of time, so that sums have the same bits each time.
-    while let Some((period, sums)) = read.try_next().await? {
+    for step in steps {
+        let Some(values) = read.try_next().await? else {
+            let what = step.field.to_string();
+            return Err(ComputeError::inconsistent(what, "it was not read"));
+        };
+        let (period, bands, windows) = (step.period, Arc::clone(bands), windows.clone());
+        let sums = tokio::task::spawn_blocking(move || bands.sums(&windows, &values)).await;
+        let sums = sums.map_err(|e| ComputeError::inconsistent(step.field.to_string(), e))?;
         let from = bins.partition_point(|bin| bin.end <= period.start);
         let touched = bins.iter().zip(&mut all).skip(from);
         for (bin, all) in touched.take_while(|(bin, _)| bin.start < period.end) {

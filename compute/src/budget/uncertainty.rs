@@ -14,15 +14,19 @@ mod scheme;
 mod summing;
 mod transform;
 
+use std::pin::pin;
 use std::sync::Arc;
 
 use contract::budget::{
     BudgetErrors, BudgetQuery, BudgetRow, BudgetUncertainty, RowUncertainty, StatedError,
 };
+use contract::chunk;
+use contract::grid::Grid;
 use contract::manifest::{Manifest, Step};
 use contract::region::Cells;
 use contract::time::Period;
-use storage::fields;
+use cube::Values;
+use futures::TryStreamExt as _;
 
 use self::drawing::Drawing;
 use self::errors::Source;
@@ -33,6 +37,7 @@ use self::summing::Summing;
 use super::over_region::{AskedArea, weights};
 use super::rows::KG_PER_TG;
 use crate::region::loaded::{RegionWeights, weights_failed};
+use crate::step_range::step_range;
 use crate::{ComputeError, Engine};
 
 /// Rows with how uncertain they are, and how that was reckoned.
@@ -78,9 +83,14 @@ pub(super) async fn of_rows(
     let mut drawing = Drawing::new(&manifest.grid, &window, &region, errors, steps.len())?;
     let words = scheme.words.clone();
     let mut summing = Summing::new(&manifest.grid, scheme, region, errors);
+    let chunks = chunks_of(&manifest.grid, &summing.region);
+    let values = Values::of(engine.store(), &Arc::new(manifest.clone())).await?;
+    let mut read = pin!(values.each(step_range(manifest, steps)?, &chunks));
     for step in steps {
-        let own = source.read(engine.store(), step.period).await?;
-        let values = fields::read(engine.store(), &step.field, &manifest.grid).await?;
+        let own = source.read(engine.store(), &chunks, step.period).await?;
+        let values = read.try_next().await?;
+        let values = values
+            .ok_or_else(|| ComputeError::inconsistent(step.field.as_str(), "it was not read"))?;
         let values = Arc::new(values);
         let weighed = summing.weighed(&values, &own).await?;
         for (row, period) in periods.iter().enumerate() {
@@ -107,6 +117,13 @@ pub(super) async fn of_rows(
         basis: basis(errors, words, &sums),
         rows: uncertain,
     })
+}
+
+/// The chunks that a region touches, in its order: all of a step that is read.
+fn chunks_of(grid: &Grid, region: &RegionWeights) -> Vec<chunk::Window> {
+    let all = chunk::field_chunks(grid);
+    let touched = region.chunks().map(|(number, _)| all[number as usize]);
+    touched.collect()
 }
 
 /// Areas of what counts of the region.

@@ -1,9 +1,10 @@
 //! Which cell and which steps an observation belongs to: pure maths.
 
-use contract::grid::{Grid, LonLatDeg};
+use contract::grid::LonLatDeg;
 use contract::manifest::{Bracket, Manifest};
 use contract::observation::Observation;
 use contract::time::TimeMs;
+use cube::CellAt;
 
 use super::{LeftOut, TimeMatch};
 
@@ -14,7 +15,7 @@ const HOUR_MS: f64 = 3_600_000.0;
 /// The share of one step in a value.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Share {
-    pub(super) step: usize,
+    step: usize,
     weight: f64,
 }
 
@@ -23,8 +24,8 @@ pub(super) struct Share {
 pub(super) struct Pair {
     /// Its index.
     pub(super) observation: usize,
-    /// Index of its cell, row-major.
-    cell: usize,
+    /// Row and column of its cell.
+    cell: (u32, u32),
     pub(super) shares: Vec<Share>,
     /// The product's value, once its steps were added; NaN where one of them has no data.
     pub(super) gridded: f64,
@@ -39,11 +40,21 @@ pub(super) struct Pairing {
 }
 
 impl Pair {
-    /// Adds the share of a step, given its values `[row, col]`.
-    pub(super) fn add(&mut self, step: usize, values: &[f32]) {
-        let value = f64::from(values[self.cell]);
-        let shares = self.shares.iter().filter(|share| share.step == step);
-        self.gridded += shares.map(|share| share.weight * value).sum::<f64>();
+    /// Its cell at each of its steps.
+    pub(super) fn cells(&self) -> impl Iterator<Item = CellAt> {
+        let (row, col) = self.cell;
+        self.shares.iter().map(move |share| CellAt {
+            step: share.step,
+            row,
+            col,
+        })
+    }
+
+    /// Adds up the values of these, in their order.
+    pub(super) fn add(&mut self, values: &[f32]) {
+        for (share, value) in self.shares.iter().zip(values) {
+            self.gridded += share.weight * f64::from(*value);
+        }
     }
 }
 
@@ -72,7 +83,7 @@ pub(super) fn all(
         };
         pairing.pairs.push(Pair {
             observation: index,
-            cell: cell_index(&manifest.grid, row, col),
+            cell: (row, col),
             shares,
             gridded: 0.0,
             distance_km: distance_km(place, manifest.grid.cell_center(row, col)),
@@ -80,10 +91,6 @@ pub(super) fn all(
         });
     }
     pairing
-}
-
-fn cell_index(grid: &Grid, row: u32, col: u32) -> usize {
-    row as usize * grid.cols as usize + col as usize
 }
 
 /// The steps that a time is compared with and their weights, and hours from the middle of the covering step; none if no
@@ -137,6 +144,7 @@ fn distance_km(a: LonLatDeg, b: LonLatDeg) -> f64 {
 mod tests {
     use super::*;
     use contract::digest::Digest;
+    use contract::grid::Grid;
     use contract::key::ObjectKey;
     use contract::manifest::{MANIFEST_SCHEMA, Step};
     use contract::quantity::Quantity;

@@ -7,6 +7,7 @@ use contract::manifest::{MANIFEST_SCHEMA, Step};
 use contract::observation::{PlatformKind, Quality};
 use contract::quantity::Quantity;
 use contract::time::Period;
+use storage::fields;
 
 use super::*;
 use crate::ErrorClass;

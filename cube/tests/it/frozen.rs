@@ -18,7 +18,7 @@ fn frozen(version: u32) -> PathBuf {
 }
 
 /// A copy of a frozen store.
-fn copy(version: u32) -> (tempfile::TempDir, Store) {
+pub(crate) fn copy(version: u32) -> (tempfile::TempDir, Store) {
     copy_of(&frozen(version))
 }
 

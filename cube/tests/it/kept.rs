@@ -26,7 +26,7 @@ async fn three_versions(store: &Store) -> Vec<contract::manifest::Manifest> {
     all
 }
 
-fn in_hours(hours: i64) -> TimeMs {
+pub(crate) fn in_hours(hours: i64) -> TimeMs {
     let since = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
     TimeMs::new(since.unwrap().as_millis() as i64 + hours * 3_600_000).unwrap()
 }

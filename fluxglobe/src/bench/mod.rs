@@ -4,6 +4,7 @@ pub(crate) mod budget;
 pub(crate) mod compare;
 pub(crate) mod fill;
 pub(crate) mod fly;
+pub(crate) mod landing;
 mod listed;
 pub(crate) mod quality;
 pub(crate) mod render;

@@ -168,6 +168,8 @@ pub(crate) enum Bench {
     Compare(BenchCompare),
     /// Gap filling on this machine's Vulkan device, or with --cpu on the processor: every form, small grids first.
     Fill(super::BenchFill),
+    /// What a landing costs: one frame into products of 10 and 1,000 steps, time and bytes; and windows of it, read.
+    Landing(super::BenchLanding),
 }
 
 /// `fluxglobe bench budget`.

@@ -110,6 +110,35 @@ pub(crate) struct Verify {
     pub(crate) json: bool,
 }
 
+/// `fluxglobe migrate`.
+#[derive(Debug, Args)]
+#[command(after_long_help = "\
+A store of before holds values in fields (frames/) under manifests. Programs of now keep each product as a cube beside them
+(cubes/), which xarray and others open, and which series, means and windows are read from; what has none is answered from
+whole fields, rightly and slowly.
+
+For every product and every version that is kept, oldest first, this
+  1. puts the steps that the cube does not have, commits them, and names the state by the number of the version;
+  2. compares each step with its field, bit by bit;
+  3. makes runs of 128 steps time-major, and compares all objects of the cube with their checksums.
+Manifests and fields stay as they are, and so do budgets, series, pictures and what people cite. It may run beside services
+and be killed at any point: the same command goes on where it was, and once all is over it only compares. A cube that holds
+anything else than the fields is an error that names array, step and cell, and the exit code is 1.
+
+Room: about as much as frames/ takes. What nobody reads any more (series/) is removed by `fluxglobe gc`.
+
+Examples:
+  fluxglobe --data OLD-DATA migrate
+  fluxglobe --store s3://BUCKET/PREFIX migrate --product takahashi09-flux --json")]
+pub(crate) struct Migrate {
+    /// This product only; all if absent.
+    #[arg(long)]
+    pub(crate) product: Option<ProductId>,
+    /// What became of each version as JSON.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
 /// `fluxglobe gc`.
 #[derive(Debug, Args)]
 pub(crate) struct Gc {

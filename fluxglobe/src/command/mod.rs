@@ -11,6 +11,7 @@ mod gc;
 pub(crate) mod generate;
 mod ingest;
 mod legend;
+mod migrate;
 pub(crate) mod notice;
 mod observations;
 mod products;
@@ -84,6 +85,7 @@ pub(crate) async fn run(settings: &Settings, command: Command) -> Result<ExitCod
         }
         Command::Survey(options) => survey::run(&options).await?,
         Command::Verify(options) => return verify::run(settings, &options).await,
+        Command::Migrate(options) => return migrate::run(settings, &options).await,
         Command::Gc(options) => gc::run(settings, &options).await?,
         Command::Bench(Bench::Stream(options)) => {
             let log = deployment::needed_log(settings, &options.kafka).await?;
@@ -95,6 +97,7 @@ pub(crate) async fn run(settings: &Settings, command: Command) -> Result<ExitCod
         Command::Bench(Bench::Fly(options)) => bench::fly::run(&options).await?,
         Command::Bench(Bench::Quality(options)) => bench::quality::run(settings, options).await?,
         Command::Bench(Bench::Compare(options)) => bench::compare::run(&options)?,
+        Command::Bench(Bench::Landing(options)) => bench::landing::run(&options).await?,
         Command::Bench(Bench::Fill(options)) => bench::fill::run(settings, &options)?,
         Command::Adapters(options) => adapters::run(settings, &options)?,
         Command::Generate(options) => generate::run(options)?,

@@ -87,7 +87,11 @@ impl Store {
     /// older program wrote. Nothing else ever changes.
     pub async fn put_over(&self, key: &ObjectKey, content: Bytes) -> Result<(), StorageError> {
         let sent = match &self.place {
-            Place::Folder(root) => folder::replace(root.clone(), key.clone(), content).await,
+            Place::Folder(root) => {
+                let bytes = content.len();
+                let put = folder::replace(root.clone(), key.clone(), content).await;
+                put.inspect(|()| self.wrote(bytes))
+            }
             Place::Cloud | Place::Hdfs | Place::Memory => {
                 let payload = PutPayload::from_bytes(content);
                 let sent = self.objects.put(&path(key), payload).await;
@@ -99,7 +103,10 @@ impl Store {
 
     async fn create(&self, key: &ObjectKey, content: &Bytes) -> Result<(), Error> {
         match &self.place {
-            Place::Folder(root) => folder::create(root.clone(), key.clone(), content.clone()).await,
+            Place::Folder(root) => {
+                let made = folder::create(root.clone(), key.clone(), content.clone()).await;
+                made.inspect(|()| self.wrote(content.len()))
+            }
             Place::Cloud if content.len() > WHOLE_BYTES && key.vouches() != Vouched::Nothing => {
                 self.send_parts(key, content).await
             }

@@ -74,9 +74,10 @@ impl Store {
     ) -> Result<Option<Seen>, StorageError> {
         match &self.place {
             Place::Folder(root) => {
-                let limit = self.retry_limits.retries;
+                let (limit, bytes) = (self.retry_limits.retries, content.len());
                 let swapped = locked::swap(root.clone(), key.clone(), seen, content, limit);
-                swapped.await.map_err(|e| failed(key, e))
+                let swapped = swapped.await.map_err(|e| failed(key, e))?;
+                Ok(swapped.inspect(|_seen| self.wrote(bytes)))
             }
             Place::Hdfs => numbered::swap(self, key, seen, content).await,
             Place::Memory | Place::Cloud => self.swap_by_request(key, seen, content).await,

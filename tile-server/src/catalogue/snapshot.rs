@@ -1,30 +1,38 @@
-//! What a store says of its products: one listing in, the newest version of each out.
+//! What a store says of its products: its folders and one small request for each in, the newest version of each out.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use contract::flow::{check_parts, northward_of};
-use contract::key::ObjectKey;
 use contract::kind::Kind;
 use contract::manifest::{Manifest, ManifestId};
 use contract::product::ProductId;
+use futures::stream::{self, StreamExt as _, TryStreamExt as _};
 use storage::{StorageError, Store, manifests};
 
 use super::layer::{Accumulated, Layer, Northward, equal_until};
 use crate::metrics::Metrics;
 use crate::versions::Versions;
 
-/// Folder of all manifests; [`ObjectKey::manifest`] puts them there.
+/// Folder of all manifests; [`contract::key::ObjectKey::manifest`] puts them there.
 pub(super) const FOLDER: &str = Kind::Manifest.folder();
 
-type Entry = (ObjectKey, Arc<Manifest>, ManifestId);
+/// Requests under way at a time.
+const AT_ONCE: usize = 16;
+/// After so many looks, whether the newest version that is known is still there is asked too: somebody may have taken a damaged one
+/// away (docs/operations.md).
+const LOOKS: u32 = 16;
+
+type Entry = (Arc<Manifest>, ManifestId);
 
 /// What was known at one moment.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Snapshot {
     /// When the store was asked; none if that was never, or may have changed since.
     pub(super) read_at: Option<Instant>,
+    /// How often it was.
+    pub(super) looks: u32,
     pub(super) known: BTreeMap<ProductId, Entry>,
     pub(super) layers: BTreeMap<ProductId, Arc<Layer>>,
 }
@@ -49,32 +57,30 @@ pub(super) struct Reader {
 }
 
 impl Reader {
-    /// One listing of all manifests; only those that are new are read.
+    /// Which products there are by one listing of their folders, and of each whether there is a newer version than is known; only
+    /// those are read. Versions are not listed but for a product that was not known before.
     pub(super) async fn read(&self, before: &Snapshot) -> Result<Snapshot, StorageError> {
         let read_at = Some(Instant::now());
-        let mut newest: BTreeMap<ProductId, ObjectKey> = BTreeMap::new();
-        for key in self.store.list(FOLDER).await? {
-            // Keys come sorted and numbers are zero-padded: the last of a product is its newest.
-            if let Some(product) = key
-                .as_str()
-                .split('/')
-                .nth(1)
-                .and_then(|name| name.parse().ok())
-            {
-                newest.insert(product, key);
-            }
-        }
+        let looks = before.looks.wrapping_add(1);
+        let is_thorough = looks.is_multiple_of(LOOKS);
         // Manifests are never deleted: a product that is gone was lost with its disk, not withdrawn.
         let mut known = before.known.clone();
-        for (product, key) in newest {
-            if known.get(&product).is_none_or(|entry| entry.0 != key)
-                && let Some(entry) = self.load(&product, key).await?
-            {
-                known.insert(product, entry);
-            }
+        let products = manifests::products(&self.store).await?;
+        let mut newest = stream::iter(products)
+            .map(|product| {
+                let there = before.known.get(&product);
+                async move {
+                    let newest = self.newest(&product, there, is_thorough).await?;
+                    Ok::<_, StorageError>((product, newest))
+                }
+            })
+            .buffered(AT_ONCE);
+        while let Some((product, newest)) = newest.try_next().await? {
+            known.extend(newest.map(|entry| (product, entry)));
         }
+        drop(newest);
         let mut layers = BTreeMap::new();
-        for (product, (_, manifest, id)) in &known {
+        for (product, (manifest, id)) in &known {
             let Some(extent) = manifest.extent() else {
                 continue;
             };
@@ -92,6 +98,7 @@ impl Reader {
         }
         Ok(Snapshot {
             read_at,
+            looks,
             known,
             layers,
         })
@@ -106,7 +113,7 @@ impl Reader {
         id: &ManifestId,
     ) -> Option<Accumulated> {
         let product = manifest.product.accumulated().ok()?;
-        let (_, derived, derived_id) = known.get(&product)?;
+        let (derived, derived_id) = known.get(&product)?;
         let source = derived.derived_from.as_ref()?;
         let accumulated = Accumulated::new(derived_id.clone(), Arc::clone(derived));
         if source == id {
@@ -126,25 +133,36 @@ impl Reader {
         })
     }
 
-    /// The newest manifest of a product; none if it is damaged, which must not hide the other products.
-    async fn load(
+    /// The newest version of a product if it is another than is known; none, too, if it is damaged, which must not hide the other
+    /// products.
+    async fn newest(
         &self,
         product: &ProductId,
-        key: ObjectKey,
+        known: Option<&Entry>,
+        is_thorough: bool,
     ) -> Result<Option<Entry>, StorageError> {
-        match manifests::latest(&self.store, product).await {
+        let found = match known {
+            Some((manifest, _)) => {
+                let number = manifest.number;
+                let is_gone =
+                    is_thorough && !manifests::is_there(&self.store, product, number).await?;
+                if is_gone {
+                    manifests::latest(&self.store, product).await
+                } else {
+                    manifests::newer(&self.store, product, number).await
+                }
+            }
+            None => manifests::latest(&self.store, product).await,
+        };
+        match found {
             Ok(manifest) => Ok(manifest.map(|manifest| {
                 let id = manifest.id();
-                (
-                    ObjectKey::manifest(product, manifest.number),
-                    Arc::new(manifest),
-                    id,
-                )
+                (Arc::new(manifest), id)
             })),
             Err(error) if error.is_retryable() => Err(error),
             Err(error) => {
                 self.metrics.store_failures.inc();
-                tracing::error!(%error, product.id = %product, object.key = %key, "a manifest cannot be used");
+                tracing::error!(%error, product.id = %product, "a manifest cannot be used");
                 Ok(None)
             }
         }
@@ -153,7 +171,7 @@ impl Reader {
 
 /// The newest northward part of the vector whose eastward part a product is.
 fn northward(known: &BTreeMap<ProductId, Entry>, eastward: &Manifest) -> Option<Northward> {
-    let (_, manifest, id) = known.get(&northward_of(eastward)?)?;
+    let (manifest, id) = known.get(&northward_of(eastward)?)?;
     check_parts(eastward, manifest).ok()?;
     manifest.extent()?;
     Some(Northward {
@@ -161,3 +179,6 @@ fn northward(known: &BTreeMap<ProductId, Entry>, eastward: &Manifest) -> Option<
         manifest: Arc::clone(manifest),
     })
 }
+
+#[cfg(test)]
+mod tests;

@@ -30,7 +30,7 @@ use crate::state::AppState;
     ),
     responses(
         (status = 200, description = "The value of the key", content(("application/octet-stream"))),
-        (status = 206, description = "The bytes of it that `Range` asked for", content(("application/octet-stream"))),
+        (status = 206, description = "The bytes of it that `Range` asked for; with another tag in `If-Range` all of it is sent", content(("application/octet-stream"))),
         (status = 304, description = "The copy that the client has is right"),
         (status = 404, description = "No such product, version or key, or a chunk without data", body = crate::error::Refusal),
         (status = 416, description = "It has no such bytes", body = crate::error::Refusal),
@@ -59,7 +59,11 @@ pub(crate) async fn get(
     if has_tag(&asked, &tag) {
         return Ok((StatusCode::NOT_MODIFIED, headers).into_response());
     }
-    let range = part(&asked, length)?;
+    let range = if is_of_same(&asked, &tag) {
+        part(&asked, length)?
+    } else {
+        None
+    };
     let content = state.cubes.get(&keys, &key, range.clone()).await?;
     let content = content.ok_or(ServerError::UnknownAddress)?;
     let described = [(header::CONTENT_TYPE, "application/octet-stream")];
@@ -100,6 +104,13 @@ async fn opened(state: &AppState, product: &str) -> Result<(Arc<Keys>, bool), Se
     Ok((keys, is_pinned))
 }
 
+/// Is a range asked for of what is there now? Who gives a tag with `If-Range` has a part of that, and wants the rest of it or all of
+/// what came since (RFC 9110, 13.1.5): nothing here has a date, and a weak tag never compares.
+fn is_of_same(asked: &HeaderMap, tag: &str) -> bool {
+    let of = asked.get(header::IF_RANGE);
+    of.is_none_or(|of| of.as_bytes() == tag.as_bytes())
+}
+
 /// The one range of bytes that is asked for; none where all are, or several, which may be answered so (RFC 9110, 14.2).
 fn part(asked: &HeaderMap, length: u64) -> Result<Option<Range<u64>>, ServerError> {
     let range = asked.get(header::RANGE).and_then(|it| it.to_str().ok());
@@ -132,6 +143,21 @@ mod tests {
         let mut asked = HeaderMap::new();
         asked.insert(header::RANGE, range.parse().unwrap());
         part(&asked, 100).map_err(|error| error.status())
+    }
+
+    #[test]
+    fn a_range_is_of_what_the_client_has_a_part_of() {
+        let of = |if_range: Option<&'static str>| {
+            let mut asked = HeaderMap::new();
+            if let Some(tag) = if_range {
+                asked.insert(header::IF_RANGE, tag.parse().unwrap());
+            }
+            is_of_same(&asked, "\"a\"")
+        };
+        assert!(of(None) && of(Some("\"a\"")));
+        for other in ["\"b\"", "W/\"a\"", "a", "Sat, 29 Oct 1994 19:43:31 GMT"] {
+            assert!(!of(Some(other)), "{other}");
+        }
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! A store behind a network that goes silent: what is in memory is served, the rest is refused within seconds.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
@@ -43,7 +43,8 @@ async fn object(
     let request = (method.clone(), key.clone());
     bucket.requests.lock().unwrap().push(request);
     if key.is_empty() {
-        return listing(&bucket, query.get("prefix").map_or("", String::as_str));
+        let prefix = query.get("prefix").map_or("", String::as_str);
+        return listing(&bucket, prefix, query.contains_key("delimiter"));
     }
     let mut objects = bucket.objects.lock().unwrap();
     let dated = |length: usize| {
@@ -69,7 +70,7 @@ async fn object(
     }
 }
 
-fn listing(bucket: &Bucket, prefix: &str) -> Response {
+fn listing(bucket: &Bucket, prefix: &str, is_of_folders: bool) -> Response {
     let entry = |(key, content): (&String, &Bytes)| {
         format!(
             "<Contents><Key>{key}</Key><Size>{}</Size><LastModified>2000-01-01T00:00:00.000Z</LastModified><ETag>\"1\"</ETag></Contents>",
@@ -77,11 +78,18 @@ fn listing(bucket: &Bucket, prefix: &str) -> Response {
         )
     };
     let objects = bucket.objects.lock().unwrap();
-    let found: String = objects
-        .iter()
-        .filter(|(key, _)| key.starts_with(prefix))
-        .map(entry)
-        .collect();
+    let own = objects.iter().filter(|(key, _)| key.starts_with(prefix));
+    let found: String = if is_of_folders {
+        let folder = |(key, _): (&String, &Bytes)| {
+            let (name, _inside) = key[prefix.len()..].split_once('/')?;
+            Some(format!("{prefix}{name}/"))
+        };
+        let folders: BTreeSet<String> = own.filter_map(folder).collect();
+        let entry = |name| format!("<CommonPrefixes><Prefix>{name}</Prefix></CommonPrefixes>");
+        folders.into_iter().map(entry).collect()
+    } else {
+        own.map(entry).collect()
+    };
     format!("<ListBucketResult><IsTruncated>false</IsTruncated>{found}</ListBucketResult>")
         .into_response()
 }

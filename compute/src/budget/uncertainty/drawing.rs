@@ -62,7 +62,7 @@ impl Drawing {
         &mut self,
         step: &Step,
         rows: &[BudgetRow],
-        (values, errors): (&Arc<Vec<f32>>, &Errors),
+        (values, errors): (&Arc<Vec<Vec<f32>>>, &Errors),
     ) -> Result<(), ComputeError> {
         let (grid, window, region) = (self.grid, self.window.clone(), Arc::clone(&self.region));
         let (values, errors) = (Arc::clone(values), errors.clone());

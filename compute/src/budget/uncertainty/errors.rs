@@ -3,18 +3,18 @@
 use std::sync::Arc;
 
 use contract::budget::{BudgetErrors, StatedError};
-use contract::key::ObjectKey;
-use contract::manifest::{Manifest, Step};
+use contract::chunk::Window;
+use contract::manifest::Manifest;
 use contract::quantity::CARBON_KG_PER_MOL;
 use contract::time::Period;
-use storage::{Store, fields};
+use cube::Values;
+use storage::Store;
 
 use crate::ComputeError;
 use crate::expression::unit::{Scaled, Unit};
 use crate::region::shares::{are_same_cells, grid_text};
 
 /// Where standard errors come from.
-#[derive(Debug)]
 pub(super) enum Source<'a> {
     /// Share of the size of the flux, 1.
     Relative(f64),
@@ -23,14 +23,18 @@ pub(super) enum Source<'a> {
     Product(Stored<'a>),
 }
 
+/// Values of the chunks of a region, in its order.
+type Chunks = Arc<Vec<Vec<f32>>>;
+
 /// Errors of a product.
-#[derive(Debug)]
 pub(super) struct Stored<'a> {
     manifest: &'a Manifest,
     /// Makes kg m⁻² s⁻¹ of a stored value.
     factor: f64,
-    /// The field that was read last: one map may hold for all steps.
-    last: Option<(ObjectKey, Arc<Vec<f32>>)>,
+    /// Opened with the first step.
+    values: Option<Values>,
+    /// The map that was read last: one may hold for all steps.
+    last: Option<(usize, Chunks)>,
 }
 
 /// Standard errors of one step.
@@ -38,18 +42,18 @@ pub(super) struct Stored<'a> {
 pub(super) enum Errors {
     Relative(f64),
     Absolute(f64),
-    /// `[row, col]`, and what makes kg m⁻² s⁻¹ of them.
-    Cells(Arc<Vec<f32>>, f64),
+    /// `[row, col]` of each chunk of the region, and what makes kg m⁻² s⁻¹ of them.
+    Cells(Chunks, f64),
 }
 
 impl Errors {
-    /// The error of a cell with a flux, kg m⁻² s⁻¹, NaN where nothing says it. A share of the flux has its sign: what is wrong with
+    /// The error of a cell, by the chunk of the region and its place in that, with a flux, kg m⁻² s⁻¹, NaN where nothing says it. A share of the flux has its sign: what is wrong with
     /// a factor makes sources and sinks larger together.
-    pub(super) fn of(&self, cell: usize, flux_kg_m2_s: f64) -> f64 {
+    pub(super) fn of(&self, (chunk, cell): (usize, usize), flux_kg_m2_s: f64) -> f64 {
         match self {
             Self::Relative(share) => share * flux_kg_m2_s,
             Self::Absolute(error) => *error,
-            Self::Cells(values, factor) => factor * f64::from(values[cell]),
+            Self::Cells(values, factor) => factor * f64::from(values[chunk][cell]),
         }
     }
 }
@@ -74,13 +78,14 @@ impl<'a> Source<'a> {
         }
     }
 
-    /// The errors of a step.
+    /// The errors of a step in some chunks.
     ///
     /// # Errors
-    /// `Uncertainty` where the product has no map for it, or one with values below 0.
+    /// `Uncertainty` where the product has no map for it, or one with values below 0 there.
     pub(super) async fn read(
         &mut self,
         store: &Store,
+        chunks: &[Window],
         period: Period,
     ) -> Result<Errors, ComputeError> {
         match self {
@@ -88,7 +93,10 @@ impl<'a> Source<'a> {
             Self::Absolute(error) => Ok(Errors::Absolute(*error)),
             Self::Product(stored) => {
                 let factor = stored.factor;
-                Ok(Errors::Cells(stored.read(store, period).await?, factor))
+                Ok(Errors::Cells(
+                    stored.read(store, chunks, period).await?,
+                    factor,
+                ))
             }
         }
     }
@@ -140,17 +148,16 @@ fn stored<'a>(manifest: &'a Manifest, flux: &Manifest) -> Result<Stored<'a>, Com
     Ok(Stored {
         manifest,
         factor,
+        values: None,
         last: None,
     })
 }
 
 impl Stored<'_> {
-    /// The map of exactly a period, or the only one there is.
-    fn step(&self, period: Period) -> Result<&Step, ComputeError> {
-        let steps = &self.manifest.steps;
-        let own = self.manifest.step_of(period).and_then(|at| steps.get(at));
-        let only = || Some(steps).filter(|steps| steps.len() == 1)?.first();
-        own.or_else(only).ok_or_else(|| {
+    /// The place of the map of exactly a period, or of the only one there is.
+    fn step(&self, period: Period) -> Result<usize, ComputeError> {
+        let only = || (self.manifest.steps.len() == 1).then_some(0);
+        self.manifest.step_of(period).or_else(only).ok_or_else(|| {
             let reason = format!(
                 "it has no step of exactly {period}, as the flux has, and is no single map"
             );
@@ -158,18 +165,34 @@ impl Stored<'_> {
         })
     }
 
-    async fn read(&mut self, store: &Store, period: Period) -> Result<Arc<Vec<f32>>, ComputeError> {
-        let key = self.step(period)?.field.clone();
-        if let Some((_, values)) = self.last.as_ref().filter(|(last, _)| *last == key) {
+    async fn read(
+        &mut self,
+        store: &Store,
+        chunks: &[Window],
+        period: Period,
+    ) -> Result<Chunks, ComputeError> {
+        let step = self.step(period)?;
+        if let Some((_, values)) = self.last.as_ref().filter(|(last, _)| *last == step) {
             return Ok(Arc::clone(values));
         }
-        let values = Arc::new(fields::read(store, &key, &self.manifest.grid).await?);
-        let below = values.iter().filter(|value| **value < 0.0).count();
+        let opened = match self.values.take() {
+            Some(opened) => opened,
+            None => Values::of(store, &Arc::new(self.manifest.clone())).await?,
+        };
+        let values = opened.windows(step, chunks).await?;
+        self.values = Some(opened);
+        let below = values
+            .iter()
+            .flatten()
+            .filter(|value| **value < 0.0)
+            .count();
         if below > 0 {
+            let key = &self.manifest.steps[step].field;
             let reason = format!("{below} cells of {key} are below 0, which no standard error is");
             return Err(refused(self.manifest.product.as_str(), &reason));
         }
-        self.last = Some((key, Arc::clone(&values)));
+        let values = Arc::new(values);
+        self.last = Some((step, Arc::clone(&values)));
         Ok(values)
     }
 }

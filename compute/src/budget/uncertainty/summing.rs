@@ -17,7 +17,7 @@ use crate::region::loaded::RegionWeights;
 /// Takes sums over pairs, some at a time, off the threads that others wait on.
 pub(super) struct Summing {
     grid: Grid,
-    region: Arc<RegionWeights>,
+    pub(super) region: Arc<RegionWeights>,
     window: Window,
     at_once: usize,
     /// None where each cell's error is its own.
@@ -47,7 +47,7 @@ impl Summing {
     /// What cells of a step weigh, by blocks.
     pub(super) async fn weighed(
         &self,
-        values: &Arc<Vec<f32>>,
+        values: &Arc<Vec<Vec<f32>>>,
         errors: &Errors,
     ) -> Result<StepErrors, ComputeError> {
         let (grid, window, region) = (self.grid, self.window.clone(), Arc::clone(&self.region));
@@ -96,12 +96,12 @@ pub(super) async fn blocking<T: Send + 'static>(
     done.map_err(|e| ComputeError::inconsistent("uncertainty", e))
 }
 
-/// Area x standard error of each block: `values` are `[row, col]`, kg m⁻² s⁻¹, NaN without a flux.
+/// Area x standard error of each block: `values` are `[row, col]` of each chunk of the region, kg m⁻² s⁻¹, NaN without a flux.
 pub(super) fn weighed(
     grid: &Grid,
     window: &Window,
     region: &RegionWeights,
-    (values, errors): (&[f32], &Errors),
+    (values, errors): (&[Vec<f32>], &Errors),
 ) -> StepErrors {
     let (rows, cols) = window.size();
     let mut own = StepErrors {
@@ -109,15 +109,16 @@ pub(super) fn weighed(
         ..StepErrors::default()
     };
     let windows = field_chunks(grid);
-    for (chunk, areas_m2) in region.chunks() {
+    for (part, (chunk, areas_m2)) in region.chunks().enumerate() {
         let cells = windows[chunk as usize].cell_indices(grid);
-        for (cell, area_m2) in cells.zip(areas_m2).filter(|(_, area)| **area > 0.0) {
-            let flux = f64::from(values[cell]);
+        let cells = cells.zip(areas_m2).enumerate();
+        for (at, (cell, area_m2)) in cells.filter(|(_, (_, area))| **area > 0.0) {
+            let flux = f64::from(values[part][at]);
             if flux.is_nan() {
                 continue;
             }
             own.flux_m2 += area_m2;
-            let share = area_m2 * errors.of(cell, flux);
+            let share = area_m2 * errors.of((part, at), flux);
             if share.is_nan() {
                 continue;
             }

@@ -4464,7 +4464,7 @@ export interface operations {
                     "application/octet-stream": unknown;
                 };
             };
-            /** @description The bytes of it that `Range` asked for */
+            /** @description The bytes of it that `Range` asked for; with another tag in `If-Range` all of it is sent */
             206: {
                 headers: {
                     [name: string]: unknown;
