@@ -30,7 +30,7 @@ use std::process::ExitCode;
 
 use anyhow::Result;
 
-use crate::cli::{Bench, Command, ProductsOf, Settings, Stats};
+use crate::cli::{Bench, Command, ProductsOf, Settings};
 use crate::{bench, demo, deployment, services};
 
 /// Runs a command; the exit code says whether every part of it succeeded.
@@ -43,20 +43,7 @@ pub(crate) async fn run(settings: &Settings, command: Command) -> Result<ExitCod
             None => products::run(settings, &options).await?,
         },
         Command::Export(options) => export::run(settings, &options).await?,
-        Command::Stats(Stats::Point(options)) => stats::point(settings, &options).await?,
-        Command::Stats(Stats::Line(options)) => statistics::line(settings, &options).await?,
-        Command::Stats(Stats::Polygon(options)) => {
-            Box::pin(stats::polygon(settings, &options)).await?;
-        }
-        Command::Stats(Stats::Correlate(options)) => {
-            analysis::correlate(settings, &options).await?;
-        }
-        Command::Stats(Stats::Difference(options)) => {
-            analysis::difference(settings, &options).await?;
-        }
-        Command::Stats(Stats::Hovmoller(options)) => {
-            analysis::hovmoller(settings, &options).await?;
-        }
+        Command::Stats(which) => Box::pin(stats::run(settings, which)).await?,
         Command::FlightSql(options) => flight_sql::run(settings, &options).await?,
         Command::Sql(options) => sql::run(settings, &options).await?,
         Command::Budget(options) => budget::run(settings, &options).await?,

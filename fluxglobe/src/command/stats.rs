@@ -11,7 +11,7 @@ use contract::grid::LonLatDeg;
 use contract::series::{PointSeries, RegionSeries};
 use contract::statistics::{PointQuestion, RegionQuestion, StatisticsWishes};
 
-use crate::cli::{Settings, StatsPoint, StatsPolygon};
+use crate::cli::{Settings, Stats, StatsPoint, StatsPolygon};
 use crate::{deployment, plot, progress};
 
 use super::analysis::{self, Output};
@@ -23,7 +23,18 @@ const BAR_CHARS: f64 = 30.0;
 /// Square metres in a million square kilometres.
 const M2_PER_MILLION_KM2: f64 = 1e12;
 
-pub(crate) async fn point(settings: &Settings, options: &StatsPoint) -> Result<()> {
+pub(crate) async fn run(settings: &Settings, which: Stats) -> Result<()> {
+    match which {
+        Stats::Point(options) => point(settings, &options).await,
+        Stats::Line(options) => statistics::line(settings, &options).await,
+        Stats::Polygon(options) => Box::pin(polygon(settings, &options)).await,
+        Stats::Correlate(options) => analysis::correlate(settings, &options).await,
+        Stats::Difference(options) => analysis::difference(settings, &options).await,
+        Stats::Hovmoller(options) => analysis::hovmoller(settings, &options).await,
+    }
+}
+
+async fn point(settings: &Settings, options: &StatsPoint) -> Result<()> {
     let place = LonLatDeg::new(options.lon, options.lat)?;
     let output = Output {
         json: options.json,
@@ -83,7 +94,7 @@ pub(crate) async fn point(settings: &Settings, options: &StatsPoint) -> Result<(
     Ok(())
 }
 
-pub(crate) async fn polygon(settings: &Settings, options: &StatsPolygon) -> Result<()> {
+async fn polygon(settings: &Settings, options: &StatsPolygon) -> Result<()> {
     let store = deployment::store(settings)?;
     let output = Output {
         json: options.json,
