@@ -14,6 +14,7 @@ mod end_to_end;
 mod exported;
 mod harness_self;
 mod logged;
+mod quality;
 mod reread;
 mod same_answers;
 mod sea;
