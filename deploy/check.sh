@@ -191,6 +191,8 @@ check_gallery() {
     refused 'the look at the gallery' 'text is missing' gallery "$work/list.toml"
     sed 's/RENDERER_VERSION: u32 = /&9/' ../contract/src/job.rs >"$work/job.rs"
     refused 'the look at the gallery' 'was drawn by renderer version' gallery ../gallery/list.toml --job "$work/job.rs"
+    sed 's/ANNOTATION_VERSION: u32 = /&9/' ../contract/src/annotation.rs >"$work/annotation.rs"
+    refused 'the look at the gallery' 'was drawn by annotations version' gallery ../gallery/list.toml --annotation "$work/annotation.rs"
 }
 
 check/install.sh

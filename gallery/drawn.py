@@ -3,6 +3,7 @@
 import hashlib
 import json
 import re
+from dataclasses import dataclass
 from pathlib import Path
 
 from entries import Entry, Faulty, Gallery
@@ -18,11 +19,29 @@ def digest(file: Path) -> str:
     return hashlib.sha256(file.read_bytes()).hexdigest()
 
 
-def renderer_version(source: Path) -> int:
-    """The version of the renderer that a file of its source names."""
-    found = re.search(r"RENDERER_VERSION: u32 = (\d+);", source.read_text())
+@dataclass(frozen=True)
+class Versions:
+    """Of what draws: of the renderer, and of what it writes over pictures."""
+
+    renderer: int
+    annotations: int
+
+    @classmethod
+    def read(cls, job: Path, annotation: Path) -> "Versions":
+        """Those that two files of the source name."""
+        return cls(named(job, "RENDERER_VERSION"), named(annotation, "ANNOTATION_VERSION"))
+
+    def of(self, entry: Entry) -> dict[str, int]:
+        """Those that an entry's look depends on."""
+        own = {"renderer": self.renderer}
+        return {**own, "annotations": self.annotations} if entry.is_annotated else own
+
+
+def named(source: Path, name: str) -> int:
+    """The number that a file of the source gives a constant."""
+    found = re.search(rf"{name}: u32 = (\d+);", source.read_text())
     if found is None:
-        raise Faulty(f"{source} names no RENDERER_VERSION")
+        raise Faulty(f"{source} names no {name}")
     return int(found[1])
 
 
@@ -41,13 +60,13 @@ class Drawn:
         inputs = {} if frames is None else {frames: digest(self.root / frames)}
         return {"command": entry.command, "inputs": inputs}
 
-    def key(self, entry: Entry, renderer: int) -> str:
+    def key(self, entry: Entry, versions: Versions) -> str:
         """Names what an entry is drawn from, but for the data."""
-        text = json.dumps([self.asked(entry), renderer], sort_keys=True)
+        text = json.dumps([self.asked(entry), versions.of(entry)], sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:12]
 
-    def faults(self, entry: Entry, renderer: int) -> list[str]:
-        """Why an entry's files are not what its command makes with this version of the renderer."""
+    def faults(self, entry: Entry, versions: Versions) -> list[str]:
+        """Why an entry's files are not what its command makes with these versions of what draws."""
         held = self.record.get(entry.name)
         if held is None:
             return [f"{entry.name} has not been drawn"]
@@ -56,8 +75,10 @@ class Drawn:
             return [f"{entry.name} was drawn by another command: {held['command']}"]
         if held["inputs"] != asked["inputs"]:
             return [f"{entry.name} was drawn with other key frames than {entry.key_frames} has now"]
-        if held["renderer"] != renderer:
-            return [f"{entry.name} was drawn by renderer version {held['renderer']}, not {renderer}: make gallery"]
+        for what, version in versions.of(entry).items():
+            if held.get(what) != version:
+                own = held.get(what, "unknown")
+                return [f"{entry.name} was drawn by {what} version {own}, not {version}: make gallery"]
         found = []
         for name in entry.files:
             file = self.folder / name
@@ -67,14 +88,14 @@ class Drawn:
                 found.append(f"{name} is not the file that was drawn")
         return found
 
-    def is_current(self, entry: Entry, renderer: int) -> bool:
+    def is_current(self, entry: Entry, versions: Versions) -> bool:
         """Is there nothing to draw?"""
-        return not self.faults(entry, renderer)
+        return not self.faults(entry, versions)
 
-    def note(self, entry: Entry, renderer: int) -> None:
+    def note(self, entry: Entry, versions: Versions) -> None:
         """Takes in that an entry's files have just been drawn."""
         files = {name: digest(self.folder / name) for name in entry.files}
-        self.record[entry.name] = {**self.asked(entry), "renderer": renderer, "files": files}
+        self.record[entry.name] = {**self.asked(entry), **versions.of(entry), "files": files}
         self.write()
 
     def forget_others(self, gallery: Gallery) -> list[str]:

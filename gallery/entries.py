@@ -6,6 +6,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 FILMS = ("mp4", "webm")
+# Options that write something over a picture.
+ANNOTATIONS = frozenset(
+    f"--{what}" for what in "annotate legend date graticule names scale-bar height-bar source".split()
+)
 
 
 class Faulty(Exception):
@@ -60,6 +64,11 @@ class Entry:
         """What makes it, as people type it, anywhere below the repository's root."""
         output = f"{self.name}.{self.film or 'png'}"
         return " ".join(["fluxglobe", *(shown(word) for word in self.words), "-o", output])
+
+    @property
+    def is_annotated(self) -> bool:
+        """Is anything written over it?"""
+        return any(word.partition("=")[0] in ANNOTATIONS for word in self.words)
 
     @property
     def key_frames(self) -> str | None:

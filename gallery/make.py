@@ -10,7 +10,7 @@ import sys
 import time
 from pathlib import Path
 
-from drawn import Drawn, renderer_version
+from drawn import Drawn, Versions
 from entries import Entry, Faulty, Gallery, read
 from page import page
 
@@ -32,17 +32,21 @@ def words() -> argparse.Namespace:
     parser.add_argument("--check", action="store_true", help="check docs/gallery.md and docs/gallery, draw nothing")
     parser.add_argument("--list", type=Path, default=ROOT / "gallery/list.toml", help="the list that --check goes by")
     parser.add_argument("--job", type=Path, default=ROOT / "contract/src/job.rs", help="names the renderer's version")
+    parser.add_argument(
+        "--annotation", type=Path, default=ROOT / "contract/src/annotation.rs", help="names the version of annotations"
+    )
     parser.add_argument("--work", type=Path, default=CACHE / "gallery", help="keeps data and pictures as drawn")
     asked = parser.parse_args()
     if not asked.check and asked.list != parser.get_default("list"):
         parser.error("another --list than the repository's is only checked, never drawn")
-    if not asked.check and asked.job != parser.get_default("job"):
-        parser.error("by another --job than the repository's is only checked, never drawn")
+    for name in ("job", "annotation"):
+        if not asked.check and getattr(asked, name) != parser.get_default(name):
+            parser.error(f"by another --{name} than the repository's is only checked, never drawn")
     return asked
 
 
-def check(gallery: Gallery, docs: Path, renderer: int) -> list[str]:
-    """What is not as the list says, or as this version of the renderer draws it."""
+def check(gallery: Gallery, docs: Path, versions: Versions) -> list[str]:
+    """What is not as the list says, or as these versions of what draws draw it."""
     written = docs / "gallery.md"
     found = []
     if not written.exists() or written.read_text() != page(gallery):
@@ -50,7 +54,7 @@ def check(gallery: Gallery, docs: Path, renderer: int) -> list[str]:
     drawn = Drawn(docs / "gallery", ROOT)
     for entry in gallery.entries:
         if entry.kept:
-            found += drawn.faults(entry, renderer)
+            found += drawn.faults(entry, versions)
     named = {name for entry in gallery.entries if entry.kept for name in entry.files} | {drawn.file.name}
     there = drawn.folder.iterdir() if drawn.folder.is_dir() else ()
     found += [f"the list does not name {file.name}" for file in there if file.name not in named]
@@ -83,8 +87,7 @@ def to_draw(gallery: Gallery, asked: argparse.Namespace, drawn: dict[bool, Drawn
         raise Faulty(f"the list has no {', '.join(sorted(unknown))}")
     if asked.names:
         return [entry for entry in gallery.entries if entry.name in asked.names]
-    renderer = renderer_version(asked.job)
-    return [e for e in gallery.entries if asked.all or not drawn[e.kept].is_current(e, renderer)]
+    return [e for e in gallery.entries if asked.all or not drawn[e.kept].is_current(e, asked.versions)]
 
 
 def draw(gallery: Gallery, entries: list[Entry], asked: argparse.Namespace, drawn: dict[bool, Drawn]) -> list[str]:
@@ -98,7 +101,6 @@ def draw(gallery: Gallery, entries: list[Entry], asked: argparse.Namespace, draw
     anew, work = asked.all or asked.names, asked.work
     sources = Sources(program, work, cache, say)
     artist = Artist(program, sources.data, work / "pictures", ROOT, say)
-    renderer = renderer_version(asked.job)
     absent = sources.land_all([data for data in gallery.data if any(data in entry.data for entry in entries)])
     failed = []
     for number, entry in enumerate(entries, start=1):
@@ -113,12 +115,12 @@ def draw(gallery: Gallery, entries: list[Entry], asked: argparse.Namespace, draw
         if anew:
             artist.forget(entry)
         try:
-            artist.draw(entry, record.folder, record.key(entry, renderer))
+            artist.draw(entry, record.folder, record.key(entry, asked.versions))
         except Failed as reason:
             say(f"{where} FAILED: {reason}")
             failed.append(entry.name)
             continue
-        record.note(entry, renderer)
+        record.note(entry, asked.versions)
         sizes = ", ".join(f"{name} {(record.folder / name).stat().st_size // 1000} kB" for name in entry.files)
         say(f"{where}: {time.monotonic() - started:.0f} s, {sizes}")
     return failed
@@ -138,7 +140,7 @@ def make(gallery: Gallery, asked: argparse.Namespace, docs: Path) -> int:
     if failed:
         say(f"FAILED: {', '.join(failed)}; the others are there, and `make gallery` goes on with these")
         return 1
-    return complain(check(gallery, docs, renderer_version(asked.job)))
+    return complain(check(gallery, docs, asked.versions))
 
 
 def complain(faults: list[str]) -> int:
@@ -154,8 +156,9 @@ def main() -> int:
     docs = ROOT / "docs"
     try:
         gallery = read(asked.list)
+        asked.versions = Versions.read(asked.job, asked.annotation)
         if asked.check:
-            return complain(check(gallery, docs, renderer_version(asked.job)))
+            return complain(check(gallery, docs, asked.versions))
         return make(gallery, asked, docs)
     except Faulty as fault:
         say(str(fault))

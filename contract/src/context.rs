@@ -26,6 +26,10 @@ pub const MAX_SEA_OPACITY: f64 = 0.99;
 pub const SEA_OPACITY_DEPTH_M: f64 = 100_000.0;
 
 /// What is drawn besides the particles, without data of its own. Nothing of it is in the name of a picture without it.
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "each is a switch of its own, as people are offered it"
+)]
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Context {
@@ -46,6 +50,10 @@ pub struct Context {
     /// Shade the plain globe by a coarse relief of land and sea floor, where no relief of its own is drawn.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub sea_floor: bool,
+    /// Leave out what a thematic map, and isolines, say of land: they end at coasts, by the share of land in every pixel, and
+    /// lakes count as land (globe views).
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub mask_land: bool,
     /// Colours of the plain globe.
     #[serde(default, skip_serializing_if = "BaseMap::is_usual")]
     pub base_map: BaseMap,
@@ -111,6 +119,7 @@ impl Context {
         let of_globes = [
             (self.borders, "borders", "true"),
             (self.sea_floor, "sea floor", "true"),
+            (self.mask_land, "mask of land", "true"),
             (
                 self.base_map != usual.base_map,
                 "base map",
@@ -217,22 +226,24 @@ mod tests {
         let all = Context {
             borders: true,
             sea_floor: true,
+            mask_land: true,
             base_map: BaseMap::Light,
             background: Background::Sky,
             isolines: Some(Isolines::Decades { one: 1.0 }),
             ..both
         };
         let text = serde_json::to_string(&all).unwrap();
-        let more = r#""borders":true,"sea_floor":true,"base_map":"light","background":"sky","isolines":{"decades":{"one":"1"}}}"#;
+        let more = r#""borders":true,"sea_floor":true,"mask_land":true,"base_map":"light","background":"sky","isolines":{"decades":{"one":"1"}}}"#;
         assert!(text.ends_with(more), "{text}");
         assert_eq!(serde_json::from_str::<Context>(&text).unwrap(), all);
     }
 
     #[test]
     fn what_belongs_to_globe_views_is_refused_where_no_globe_is_drawn() {
-        let changes: [fn(&mut Context); 4] = [
+        let changes: [fn(&mut Context); 5] = [
             |c| c.borders = true,
             |c| c.sea_floor = true,
+            |c| c.mask_land = true,
             |c| c.base_map = BaseMap::Light,
             |c| c.background = Background::Sky,
         ];

@@ -18,7 +18,7 @@ use crate::trails::{TRAILS_PER_CELL, Trails};
 
 /// Raised whenever the renderer draws the same job differently or writes the same picture in other bytes, so that old
 /// pictures are not taken for new ones: a name has one content for ever. `make bless` asks for it.
-pub const RENDERER_VERSION: u32 = 10;
+pub const RENDERER_VERSION: u32 = 11;
 /// Largest width and height of a picture, pixels.
 pub const MAX_IMAGE_PX: u32 = 7680;
 /// Most pixels of a picture: as many as 8K has (7680 x 4320).
@@ -322,6 +322,11 @@ impl RenderJob {
         } = &self.style;
         let is_tile = matches!(self.view, View::Tile { .. });
         context.validate_on(is_tile, *globe_surface)?;
+        if context.mask_land && self.mode != Mode::Map {
+            let reason = "it ends thematic maps at coasts; particles are of whole cells and stand high: leave it out, or draw a map";
+            let mode = self.mode.as_str();
+            return Err(ContractError::invalid("mask of land", mode, reason));
+        }
         self.view.validate()
     }
 
@@ -622,6 +627,7 @@ mod tests {
         changed(|j| j.style.context.sea_opacity = 0.5);
         changed(|j| j.style.context.borders = true);
         changed(|j| j.style.context.sea_floor = true);
+        changed(|j| j.style.context.mask_land = true);
         changed(|j| j.style.context.base_map = BaseMap::Light);
         changed(|j| j.style.context.background = Background::Sky);
         changed(|j| j.style.context.isolines = Some(every(1e-10)));

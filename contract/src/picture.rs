@@ -38,6 +38,8 @@ pub struct PictureOptions {
     pub borders: Option<bool>,
     /// Shade the plain globe by a coarse relief; wherever one is drawn unless told otherwise.
     pub sea_floor: Option<bool>,
+    /// End a thematic map at the coasts of a globe view.
+    pub mask_land: bool,
     /// Colours of the plain globe.
     pub base_map: Option<BaseMap>,
     /// What is seen beside the globe.
@@ -166,6 +168,7 @@ impl PictureOptions {
             coastlines,
             borders: self.borders.unwrap_or(is_globe && coastlines),
             sea_floor: self.sea_floor.unwrap_or(is_globe),
+            mask_land: self.mask_land,
             base_map: self.base_map.unwrap_or(usual.base_map),
             background: self.background.unwrap_or(usual.background),
             isolines: usual.isolines,
@@ -411,7 +414,7 @@ mod tests {
                 .unwrap()
         };
         let usual = style(PictureOptions::default());
-        let changes: [fn(&mut PictureOptions); 15] = [
+        let changes: [fn(&mut PictureOptions); 16] = [
             |o| o.transfer.reversed = true,
             |o| o.isolines = Some(IsolineWish::Auto),
             |o| o.isolines = Some(IsolineWish::Every(20.0)),
@@ -425,6 +428,7 @@ mod tests {
             |o| o.globe_surface = true,
             |o| o.borders = Some(true),
             |o| o.sea_floor = Some(true),
+            |o| o.mask_land = true,
             |o| o.base_map = Some(BaseMap::Light),
             |o| o.background = Some(Background::Sky),
         ];

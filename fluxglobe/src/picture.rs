@@ -127,6 +127,7 @@ pub(crate) fn options(picture: &Picture, extras: Extras) -> PictureOptions {
         coastlines: surroundings.coastlines,
         borders: extras.ground.borders,
         sea_floor: extras.ground.sea_floor,
+        mask_land: extras.ground.mask_land,
         base_map: extras.ground.base_map,
         background: extras.ground.background,
         isolines: surroundings.isolines,

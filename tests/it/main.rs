@@ -15,6 +15,7 @@ mod exported;
 mod harness_self;
 mod logged;
 mod migrate;
+mod quality;
 mod reread;
 mod same_answers;
 mod sea;

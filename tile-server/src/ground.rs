@@ -22,6 +22,11 @@ pub(crate) struct GroundQuery {
     /// takes its place.
     #[param(value_type = Option<bool>)]
     sea_floor: Option<String>,
+    /// A thematic map (`map`) and its isolines end at coasts, by the share of land in every pixel; no unless told otherwise, as
+    /// cells are whole. Lakes count as land. Other modes refuse it.
+    #[param(value_type = Option<bool>)]
+    #[serde(alias = "mask-land")]
+    mask_land: Option<String>,
     /// Colours of the plain globe; dark unless told otherwise.
     #[param(value_type = Option<words::BaseMap>)]
     #[serde(alias = "base-map")]
@@ -38,6 +43,7 @@ impl GroundQuery {
             globe_surface: flag("surface", self.surface.as_deref())?.unwrap_or(true),
             borders: flag("borders", self.borders.as_deref())?,
             sea_floor: flag("sea_floor", self.sea_floor.as_deref())?,
+            mask_land: flag("mask_land", self.mask_land.as_deref())?.unwrap_or(false),
             base_map: parsed(self.base_map.as_deref())?,
             background: parsed(self.background.as_deref())?,
             ..*options

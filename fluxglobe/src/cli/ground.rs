@@ -26,6 +26,9 @@ pub(crate) struct Ground {
         value_name = "true|false"
     )]
     sea_floor: Option<bool>,
+    /// End a thematic map (--mode map) and its isolines at coasts: cells cover land too, of coarse grids much. Lakes count as land.
+    #[arg(long, help_heading = HEADING)]
+    mask_land: bool,
     /// Colours of the plain globe: dark or light.
     #[arg(long, help_heading = HEADING, default_value_t, value_name = "dark|light")]
     base_map: BaseMap,
@@ -44,6 +47,8 @@ pub(crate) struct GroundOptions {
     pub(crate) surface: bool,
     pub(crate) borders: Option<bool>,
     pub(crate) sea_floor: Option<bool>,
+    /// A thematic map ends at coasts.
+    pub(crate) mask_land: bool,
     pub(crate) base_map: Option<BaseMap>,
     pub(crate) background: Option<Background>,
 }
@@ -60,6 +65,7 @@ impl Ground {
             surface: !self.transparent,
             borders: self.borders,
             sea_floor: self.sea_floor,
+            mask_land: self.mask_land,
             base_map: Some(self.base_map),
             background: Some(self.background.unwrap_or(usual)),
         }
@@ -97,6 +103,8 @@ mod tests {
             (options.borders, options.sea_floor),
             (Some(false), Some(false))
         );
+        assert!(!options.mask_land);
+        assert!(globe(&["--mask-land"]).unwrap().ground.options().mask_land);
     }
 
     #[test]

@@ -54,6 +54,7 @@ pub(super) fn plan(plan: &mut Plan, job: &RenderJob, scene: &Scene) {
         context.night_on,
         context.lines_on,
         context.trails_on,
+        context.land_masked,
     ];
     params.in_context = parts.contains(&1);
     if let View::Tile { tile, size_px } = job.view
@@ -151,7 +152,7 @@ fn plain_globe(plan: &mut Plan, job: &RenderJob, camera: &Camera) {
     let size_px = job.view.size_px();
     let (style, around) = (&job.style, &job.style.context);
     let wanted = ground::Wanted {
-        land: style.globe_surface,
+        land: style.globe_surface || around.mask_land,
         coasts: around.coastlines,
         borders: around.borders,
     };
@@ -161,6 +162,7 @@ fn plain_globe(plan: &mut Plan, job: &RenderJob, camera: &Camera) {
         below_the_sea(params, job, camera);
     }
     let context = &mut params.context;
+    context.land_masked = u32::from(around.mask_land);
     // The sea floor is nowhere in a picture from below: plumes hang where it would be.
     let has_floor = around.sea_floor && !camera.is_below();
     if has_floor && style.globe_surface && context.terrain_on == 0 {
@@ -175,7 +177,7 @@ fn plain_globe(plan: &mut Plan, job: &RenderJob, camera: &Camera) {
         });
         context.coast_row_words = size_px[0];
     }
-    context.land_hides = u32::from(wanted.land);
+    context.land_hides = u32::from(style.globe_surface);
     context.coast_on = u32::from(wanted.coasts || wanted.borders);
     // On a map the lines would vanish below the colours.
     context.coast_above = u32::from(job.mode == Mode::Map);

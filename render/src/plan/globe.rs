@@ -70,7 +70,8 @@ pub(super) fn plan(plan: &mut Plan, job: &RenderJob, scene: &Scene) {
     let sun = camera.sun(job);
     params.view.sun = sun.as_vec3();
     if job.mode == Mode::Map {
-        let margin = 2.0 * grid.dlat_deg.to_radians();
+        // Isolines look two rows beyond the place of a pixel, which single precision puts a little beside itself.
+        let margin = 3.0 * grid.dlat_deg.to_radians();
         interpolate_rows(plan, grid, &camera.footprint(job, [0.0; 2], margin));
         return;
     }

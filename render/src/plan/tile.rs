@@ -322,8 +322,9 @@ fn map_axes(plan: &mut Plan, scene: &Scene, tile: Tile, size_px: u32) {
     plan.axes = axes(grid, tile, size_px);
     let rows = &plan.axes[size_px as usize..];
     let [north, south] = [rows.first(), rows.last()].map(|axis| axis.map_or(0, |axis| axis.index));
-    let first = north.clamp(0, grid.rows as i32) as u32;
-    let last = (south + 2).clamp(0, grid.rows as i32) as u32;
+    // Isolines look one row farther than values between centres of cells.
+    let first = (north - 1).clamp(0, grid.rows as i32) as u32;
+    let last = (south + 3).clamp(0, grid.rows as i32) as u32;
     interpolate_rows(plan, first..last.max(first));
 }
 

@@ -86,6 +86,8 @@ features! { params;
     HAS_SEA_DEPTH: params.particles.sea_per_m > 0.0,
     /// The grid goes round the globe.
     IS_PERIODIC: params.grid.periodic == 1,
+    /// Values over land are left out.
+    MASKS_LAND: params.context.land_masked == 1,
 }
 
 impl Features {

@@ -6,6 +6,9 @@ use glam::Vec3;
 
 use crate::stages::params::Params;
 
+const GRAZING: f32 = 0.1;
+const CLEAR: f32 = 0.3;
+
 /// What a pixel's sight line meets.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Ground {
@@ -68,6 +71,11 @@ pub fn ground_below(params: &Params, pixel: [u32; 2]) -> Ground {
         normal,
         ..met
     }
+}
+
+/// Share of a line on the sea surface that is shown: where sight grazes it, lines far apart on the ground would be a tangle.
+pub fn line_share(ground: &Ground) -> f32 {
+    ((ground.sight.dot(ground.normal).abs() - GRAZING) / (CLEAR - GRAZING)).clamp(0.0, 1.0)
 }
 
 /// Angle of a vector against the x axis, -pi to pi.

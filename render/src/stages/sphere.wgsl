@@ -16,6 +16,10 @@ fn angle_of(y: f32, x: f32) -> f32 {
     return angle;
 }
 
+// Cosine between sight line and vertical at which lines on the sea surface are gone, and from which on they are whole.
+const GRAZING = 0.1;
+const CLEAR = 0.3;
+
 struct Ground {
     on_ground: bool, lon: f32, lat: f32, normal: vec3<f32>, rim_px: f32, foot: vec3<f32>, nearest_at: f32, sight: vec3<f32>, way: f32,
 }
@@ -51,4 +55,9 @@ fn ground_below(pixel: vec2<u32>) -> Ground {
     ground.lat = angle_of(ground.normal.z, length(ground.normal.xy));
     ground.lon = angle_of(ground.normal.x, ground.normal.y);
     return ground;
+}
+
+// Share of a line on the sea surface that is shown: where sight grazes it, lines far apart on the ground would be a tangle.
+fn line_share(ground: Ground) -> f32 {
+    return clamp((abs(dot(ground.sight, ground.normal)) - GRAZING) / (CLEAR - GRAZING), 0.0, 1.0);
 }

@@ -2,11 +2,13 @@
 
 use std::sync::Arc;
 
+use contract::base_map::BaseMap;
 use contract::context::{Context, Relief};
 use contract::grid::Grid;
 use contract::job::{Mode, RenderJob, View};
 use contract::sun::Subsolar;
 use glam::Vec3;
+use render::plan::Plan;
 use render::scene::{Field, Terrain};
 use render::stages::colour::{linear_of, srgb_of};
 use render::stages::compose::terrain::tint;
@@ -255,6 +257,107 @@ fn the_sea_floor_is_seen_through_as_much_water_as_lies_above_it() {
             (found - expected).abs().max_element() < 0.005,
             "{found} {expected}"
         );
+    }
+}
+
+/// Share of land in every pixel of a globe view, 0 to 255.
+fn land_shares(job: &RenderJob, scene: &Scene) -> Vec<u32> {
+    let plan = Plan::for_device(job, scene, u64::MAX).unwrap();
+    plan.coast.iter().map(|word| word & 255).collect()
+}
+
+#[test]
+fn sea_without_data_is_hatched_under_a_relief_too_and_nothing_else_is() {
+    const SIDE: u32 = 200;
+    let sampled = bare(|lon, _| if lon > -120.0 { 800.0 } else { -3000.0 });
+    let mut unsampled = sampled.clone();
+    unsampled.domain = Scene::domain_of(sampled.domain.content().iter().map(|_| false));
+    let mut all_sampled = sampled;
+    all_sampled.domain = Scene::domain_of(unsampled.domain.content().iter().map(|_| true));
+    for base_map in [BaseMap::Dark, BaseMap::Light] {
+        let mut job = over_relief(job(Mode::Map, globe(-110.0, 25.0, 4e6, SIDE)), 15.0);
+        job.accumulated = None;
+        job.style.context.base_map = base_map;
+        let land = land_shares(&job, &unsampled);
+        for renderer in renderers("hatch") {
+            let [with, without] =
+                [&unsampled, &all_sampled].map(|scene| renderer.render(&job, scene).unwrap());
+            let (mut hatched, mut bare_land) = (0, 0);
+            for (at, land) in (0..SIDE * SIDE).zip(&land) {
+                let (x, y) = (at % SIDE, at / SIDE);
+                let levels = |image: &Image| -> i32 {
+                    image.pixel(x, y)[..3]
+                        .iter()
+                        .map(|level| i32::from(*level))
+                        .sum()
+                };
+                let lighter = levels(&with) - levels(&without);
+                let is_on_line = (x + y) % 8 < 2;
+                match (is_on_line, land) {
+                    // All sea, whatever heights the relief has there: its coasts are not those that are drawn.
+                    (true, 0) => {
+                        assert!(lighter > 12, "{x} {y}: {lighter}");
+                        hatched += 1;
+                    }
+                    (true, 1..=254) => assert!(lighter >= 0, "{x} {y}: {lighter}"),
+                    _ => assert_eq!(lighter, 0, "{x} {y} {land}"),
+                }
+                bare_land += u32::from(*land == 255);
+            }
+            assert!(hatched > 2000 && bare_land > 5000, "{hatched} {bare_land}");
+        }
+    }
+}
+
+#[test]
+fn masked_land_has_no_values_and_the_sea_has_all_of_them() {
+    const SIDE: u32 = 200;
+    let mut scene = ocean(FIVE_DEGREES);
+    // Values everywhere, on land too.
+    let values = vec![1e-9; FIVE_DEGREES.cell_count()];
+    let field = Arc::new(Field::new(values));
+    (scene.value.before, scene.value.after) = (Arc::clone(&field), field);
+    scene.domain = Scene::domain_of((0..FIVE_DEGREES.cell_count()).map(|_| true));
+    let mut masked = job(Mode::Map, globe(-95.0, 30.0, 4e6, SIDE));
+    masked.style.globe_surface = true;
+    masked.style.context.mask_land = true;
+    let mut whole = masked.clone();
+    whole.style.context.mask_land = false;
+    // What is seen where nothing is drawn.
+    let nothing = vec![f32::NAN; FIVE_DEGREES.cell_count()];
+    let nothing = Arc::new(Field::new(nothing));
+    let mut empty = scene.clone();
+    (empty.value.before, empty.value.after) = (Arc::clone(&nothing), nothing);
+    let land = land_shares(&masked, &scene);
+    for renderer in renderers("masked land") {
+        let [masked, whole, ground] = [(&masked, &scene), (&whole, &scene), (&whole, &empty)]
+            .map(|(job, scene)| renderer.render(job, scene).unwrap());
+        let mut counts = [0; 3];
+        for (at, land) in (0..SIDE * SIDE).zip(&land) {
+            let at = |image: &Image| image.pixel(at % SIDE, at / SIDE);
+            let kind = match land {
+                0 => 0,
+                255 => 1,
+                _ => 2,
+            };
+            counts[kind] += 1;
+            if kind < 2 {
+                let expected = [at(&whole), at(&ground)][kind];
+                assert_eq!(at(&masked), expected, "{land}");
+            }
+        }
+        assert!(counts.iter().all(|count| *count > 300), "{counts:?}");
+        // Without a globe nothing is left of it there.
+        let mut bare = job(Mode::Map, globe(-95.0, 30.0, 4e6, SIDE));
+        bare.style.context.mask_land = true;
+        let bare = renderer.render(&bare, &scene).unwrap();
+        for (at, land) in (0..SIDE * SIDE).zip(&land) {
+            let [.., alpha] = bare.pixel(at % SIDE, at / SIDE);
+            assert!(
+                (*land < 255 || alpha == 0) && (*land > 0 || alpha > 0),
+                "{land} {alpha}"
+            );
+        }
     }
 }
 

@@ -6,7 +6,7 @@ use contract::tile::mercator_lat_deg;
 use render::plan::Plan;
 use render::scene::{Field, Interval};
 use render::stages::isolines::cpu::{Inputs, draw_lines};
-use render::stages::sphere::ground_below;
+use render::stages::sphere::{ground_below, line_share};
 use render::{Image, Scene};
 
 use crate::compare::distance;
@@ -15,7 +15,7 @@ use crate::scenes::{FIVE_DEGREES, ONE_DEGREE, globe, job, looking_at, ocean, til
 use crate::seams::children_of;
 
 /// A field from a formula of longitude and latitude, degrees, everywhere.
-fn field(value: impl Fn(f64, f64) -> f64) -> Scene {
+pub(crate) fn field(value: impl Fn(f64, f64) -> f64) -> Scene {
     let grid = ONE_DEGREE;
     let cells = (0..grid.rows).flat_map(|row| (0..grid.cols).map(move |col| (row, col)));
     let values = cells.map(|(row, col)| {
@@ -129,7 +129,9 @@ fn lines_are_as_wide_on_a_tilted_globe_as_on_a_map() {
             let ground = ground_below(&params, [x as u32, y as u32]);
             let [lon, lat] =
                 [ground.lon_rad, ground.lat_rad].map(|angle| f64::from(angle).to_degrees());
-            (ground.on_ground && ground.rim_px > 30.0).then_some(0.7 * (lon + 30.0) + 0.5 * lat)
+            // Where sight grazes the ground lines fade.
+            let is_clear = ground.rim_px > 30.0 && line_share(&ground) >= 1.0;
+            (ground.on_ground && is_clear).then_some(0.7 * (lon + 30.0) + 0.5 * lat)
         };
         let mut seen = 0;
         for y in 1..199 {
@@ -171,6 +173,89 @@ fn a_level_field_has_no_line_though_it_lies_on_one() {
     let steep = field(|lon, _| 20.0 * (8.0 * lon).sin());
     let (_, cover) = covers(&lined(tile(0, 0, 0, 256), 2.0), &steep);
     assert!(cover.iter().sum::<f64>() < 0.25 * cover.len() as f64);
+}
+
+/// A sea at 8 in which cells stand out: every sixth row every fourth, and between these rows three side by side, the middle one more.
+pub(crate) fn with_lone_cells(peak: f64) -> Scene {
+    field(move |lon, lat| {
+        let [col, row] = [lon + 180.0, lat + 90.0].map(|angle| angle.floor() as i64);
+        match (row % 6, col % 12) {
+            (0, 0 | 4 | 8) | (3, 5 | 7) => peak,
+            (3, 6) => peak + 1.0,
+            _ => 8.0,
+        }
+    })
+}
+
+#[test]
+fn a_line_round_a_single_cell_is_left_out_where_it_is_a_dot() {
+    // Lines of 10 round peaks of 11 are a third of a cell away from their middles, each way.
+    let covered = |tile_view: View, peak: f64| {
+        let scene = with_lone_cells(peak);
+        let (plan, cover) = covers(&lined(tile_view, 10.0), &scene);
+        let width = plan.size_px()[0] as usize;
+        // Rows of pixels beside lone cells, and beside three in a row.
+        let most = |first_row: i64| -> f64 {
+            let rows = (0..width).filter(|y| {
+                let axis = plan.axes[width + y];
+                let from_south = 179 - i64::from(axis.index);
+                // Farther north a map makes dots large.
+                from_south < 130 && (from_south - first_row).rem_euclid(6) < 2
+            });
+            let pixels = rows.flat_map(|y| &cover[y * width..(y + 1) * width]);
+            pixels.copied().fold(0.0, f64::max)
+        };
+        [most(0), most(3)]
+    };
+    // A cell of 1.4 pixels: the line would be a pixel wide. Round three cells it is four wide, and stays.
+    let [lone, row] = covered(tile(1, 0, 0, 256), 11.0);
+    assert!(lone <= 0.0, "{lone}");
+    assert!(row > 0.2, "{row}");
+    // Of 23 pixels: it is fifteen wide.
+    let [lone, row] = covered(tile(5, 16, 15, 256), 11.0);
+    assert!(lone > 0.6 && row > 0.6, "{lone} {row}");
+    // Between these it comes evenly: where it is widest, at 40 degrees north, it is 4.5 pixels wide and half there.
+    let cells = 4.5 / (2048.0 / 360.0) * 40f64.to_radians().cos();
+    let peak = 8.0 + 2.0 / (1.0 - cells / 2.0);
+    let [lone, _] = covered(tile(3, 4, 3, 256), peak);
+    assert!((0.3 * 0.72..=0.52 * 0.72).contains(&lone), "{lone}");
+}
+
+#[test]
+fn lines_fade_where_sight_grazes_the_sea() {
+    let slanted = field(|lon, lat| 0.7 * lon + 0.5 * lat);
+    for view in [
+        globe(-30.0, 20.0, 2e7, 400),
+        looking_at([-30.0, 10.0], 3e6, [50.0, 70.0], 400),
+    ] {
+        let mut job = lined(view, 10.0);
+        job.annotations = Some(contract::annotation::Annotations {
+            graticule: contract::annotation::Graticule::every(10.0).ok(),
+            ..contract::annotation::Annotations::none()
+        });
+        let plan = Plan::new(&job, &slanted, u64::MAX).unwrap();
+        let params = plan.params_of(plan.whole());
+        let mut lines = vec![0; 400 * 400];
+        let value = slanted.value.before.cells.content();
+        draw_lines(&params, &Inputs::of(&plan, &slanted, value), &mut lines);
+        let (mut grazed, mut clear) = (0, [0; 2]);
+        for (at, word) in (0..).zip(&lines) {
+            let ground = ground_below(&params, [at % 400, at / 400]);
+            let cosine = -ground.sight.dot(ground.normal);
+            let covers = [word & 4095, word >> 20];
+            if ground.on_ground && cosine < 0.1 {
+                grazed += 1;
+                assert_eq!(covers, [0; 2], "{view:?} {at} {cosine}");
+            }
+            for (clear, cover) in clear.iter_mut().zip(covers) {
+                *clear += usize::from(cosine > 0.3 && cover > 1000);
+            }
+        }
+        assert!(
+            grazed > 200 && clear.iter().all(|count| *count > 300),
+            "{grazed} {clear:?}"
+        );
+    }
 }
 
 #[test]

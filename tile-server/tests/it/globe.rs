@@ -82,6 +82,10 @@ async fn a_globe_has_its_map_unless_told_otherwise_and_a_tile_has_none() {
     let bare = "/globe/flux/volume.png?coastlines=false&borders=true&sea_floor=false";
     let bare = context(bare).await;
     assert!(!bare.coastlines && bare.borders && !bare.sea_floor);
+    for name in ["mask_land", "mask-land"] {
+        let masked = context(&format!("/globe/flux/map.png?{name}=true")).await;
+        assert!(masked.mask_land && !globe.mask_land);
+    }
     for name in ["base_map", "base-map"] {
         let light = format!("/globe/flux/volume.png?{name}=light&background=sky");
         let light = context(&light).await;
@@ -93,6 +97,7 @@ async fn a_globe_has_its_map_unless_told_otherwise_and_a_tile_has_none() {
     for (query, reason) in [
         ("borders=1", "true or false"),
         ("sea_floor=", "true or false"),
+        ("mask_land=true", "thematic maps"),
         ("base_map=grey", "dark or light"),
         ("background=stars", "none or sky"),
         ("background=sky&surface=false", "draw the globe"),

@@ -22,8 +22,11 @@ const BORDER_PEN: Pen = Pen {
     half_width_px: 0.4,
     strength: 1.0,
 };
-/// Outlines that reach no farther than this from their middle are land without a line: it would be all there is to see.
+/// Outlines that reach no farther than this from their middle are land without a line: it would be all there is to see, a fleck
+/// in the sea.
 const LEAST_OUTLINE_PX: f64 = 1.5;
+/// From here on lines round them are whole.
+const WHOLE_OUTLINE_PX: f64 = 4.0;
 /// Farthest beyond the globe's outline that hidden corners are led round it, seen from the camera, radians.
 const BEYOND_RAD: f64 = 0.05;
 /// Longest step of that, radians: straight lines between them pass the globe.
@@ -366,13 +369,30 @@ impl<'a> Sight<'a> {
         })
     }
 
+    /// How much is drawn of the line round an outline, by its size in the picture: none where it is a pixel or two.
+    fn outline_share(&self, cap: &Cap) -> f64 {
+        // Its place nearest to the one straight below or above.
+        let cos = (cap.angle_to(self.up) - cap.radius).max(0.0).cos();
+        let distance = self.camera.place.length();
+        let way = (distance * distance + 1.0 - 2.0 * distance * cos).sqrt();
+        let way = way.max(f64::EPSILON);
+        let slant = ((distance * cos - 1.0) / way).abs();
+        // What is seen aslant is as large as a disc of its area.
+        let radius_px = cap.radius * self.camera.focal_px / way * slant.sqrt();
+        ((radius_px - LEAST_OUTLINE_PX) / (WHOLE_OUTLINE_PX - LEAST_OUTLINE_PX)).clamp(0.0, 1.0)
+    }
+
     pub(super) fn shores(&self, land: &[Ring], lakes: &[Ring]) -> Vec<Line> {
-        let per_rad = self.camera.focal_px / self.camera.nearest;
         let rings = |rings: &[Ring], pen: Pen| -> Vec<Line> {
-            let seen = rings.par_iter().filter(move |ring| {
-                !self.is_hidden(&ring.cap) && ring.cap.radius * per_rad >= LEAST_OUTLINE_PX
+            let seen = rings.par_iter().filter_map(move |ring| {
+                let share = self.outline_share(&ring.cap);
+                (share > 0.0 && !self.is_hidden(&ring.cap)).then_some((ring, share))
             });
-            let lines = seen.flat_map_iter(|ring| {
+            let lines = seen.flat_map_iter(|(ring, share)| {
+                let pen = Pen {
+                    strength: pen.strength * share,
+                    ..pen
+                };
                 let runs = ring.runs.iter().filter(|run| self.is_near(run));
                 runs.flat_map(move |run| {
                     let edges = ring.edges(run).zip(&ring.is_shore[run.edges.clone()]);

@@ -45,6 +45,8 @@ shared_struct! {
         pub lake: Vec3,
         /// How much of the difference between day and night is shown, 0 to 1.
         pub sun_share: f32,
+        /// What is added to the sea of a relief where the product has no data.
+        pub hatch_over_relief: Vec3,
         /// Grey and opacities of coasts and borders over what has colours of its own.
         pub over_grey: f32,
         pub over_coast_alpha: f32,
@@ -155,6 +157,10 @@ const BELOW_LIGHT: Below = Below {
     },
 };
 
+/// A sea of middle depth as a relief has it, which is the same on both base maps, and how much lighter it is where the product
+/// has no data, sRGB: as much as on the dark base map.
+const RELIEF_SEA: [f32; 3] = [0.14, 0.28, 0.38];
+
 /// How much darker the surface is from below where the product has no data, sRGB.
 const HATCH_BELOW: [f32; 3] = [-0.05; 3];
 /// Opacity of borders on it over that of coasts.
@@ -247,6 +253,7 @@ impl BaseMapParams {
             sky_alpha: f32::from(u8::from(background == Background::Sky)),
             lake: composed(colours.lake),
             sun_share: colours.sun_share,
+            hatch_over_relief: composed(sum(RELIEF_SEA, DARK.hatch)) - composed(RELIEF_SEA),
             over_grey: composed_grey(over_grey),
             over_coast_alpha,
             over_border_alpha,

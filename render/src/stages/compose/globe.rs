@@ -33,15 +33,14 @@ fn sea_colour(params: &Params, floor: Option<&terrain::Ground>) -> Vec3 {
 pub(super) fn plain(
     params: &Params,
     domain: &[u32],
-    [lon_rad, lat_rad]: [f32; 2],
+    place: [f32; 2],
     shares: [f32; 2],
     floor: Option<&terrain::Ground>,
     pixel: [u32; 2],
 ) -> Vec3 {
     let map = &params.base_map;
     let mut sea = sea_colour(params, floor);
-    let place = pixel[0] as i32 + pixel[1] as i32 + params.view.origin_px.element_sum();
-    if place % HATCH_PX < HATCH_LINE_PX && is_unsampled(params, domain, lon_rad, lat_rad) {
+    if is_hatched(params, domain, place, pixel) {
         sea += map.hatch;
     }
     let height = floor.map_or(0.0, |floor| (floor.height_m / map.high_m).clamp(0.0, 1.0));
@@ -49,7 +48,18 @@ pub(super) fn plain(
     mix(mix(sea, land, shares[0]), map.lake, shares[1])
 }
 
-fn is_unsampled(params: &Params, domain: &[u32], lon_rad: f32, lat_rad: f32) -> bool {
+/// Is a pixel on a line of the hatching, where the product has no data? `place`: longitude and latitude, radians.
+pub(super) fn is_hatched(
+    params: &Params,
+    domain: &[u32],
+    place: [f32; 2],
+    pixel: [u32; 2],
+) -> bool {
+    let along = pixel[0] as i32 + pixel[1] as i32 + params.view.origin_px.element_sum();
+    along % HATCH_PX < HATCH_LINE_PX && is_unsampled(params, domain, place)
+}
+
+fn is_unsampled(params: &Params, domain: &[u32], [lon_rad, lat_rad]: [f32; 2]) -> bool {
     let grid = &params.grid;
     let east = lon_rad - grid.west_rad;
     let col = ((east - (east / TAU).floor() * TAU) * grid.cols_per_rad).floor() as i32;

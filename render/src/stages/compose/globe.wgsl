@@ -2,7 +2,7 @@
 struct BaseMapParams {
     land: vec3<f32>, shading: f32, land_high: vec3<f32>, high_m: f32, sea: vec3<f32>, border_grey: f32, shelf: vec3<f32>, border_alpha: f32,
     deep: vec3<f32>, deep_m: f32, hatch: vec3<f32>, air_depth: f32, air: vec3<f32>, air_height: f32, sky: vec3<f32>, sky_alpha: f32,
-    lake: vec3<f32>, sun_share: f32, over_grey: f32, over_coast_alpha: f32, over_border_alpha: f32,
+    lake: vec3<f32>, sun_share: f32, hatch_over_relief: vec3<f32>, over_grey: f32, over_coast_alpha: f32, over_border_alpha: f32,
 }
 @group(0) @binding(29) var<uniform> base_map: BaseMapParams;
 
@@ -20,11 +20,16 @@ fn sea_colour(floor: Terrain) -> vec3<f32> {
 // the pixel are land and lake, as `ground_mask` says.
 fn plain(lon: f32, lat: f32, shares: vec2<f32>, floor: Terrain, pixel: vec2<u32>) -> vec3<f32> {
     var sea = sea_colour(floor);
-    let place = vec2<i32>(pixel) + view.origin_px;
-    if ((place.x + place.y) % HATCH_PX < HATCH_LINE_PX && is_unsampled(lon, lat)) { sea += base_map.hatch; }
+    if (is_hatched(lon, lat, pixel)) { sea += base_map.hatch; }
     var land = base_map.land;
     if (floor.is_known) { land = mix(land, base_map.land_high, clamp(floor.height_m / base_map.high_m, 0.0, 1.0)); }
     return mix(mix(sea, land, shares.x), base_map.lake, shares.y);
+}
+
+// Is a pixel on a line of the hatching, where the product has no data?
+fn is_hatched(lon: f32, lat: f32, pixel: vec2<u32>) -> bool {
+    let place = vec2<i32>(pixel) + view.origin_px;
+    return (place.x + place.y) % HATCH_PX < HATCH_LINE_PX && is_unsampled(lon, lat);
 }
 
 // Does the product have no data there, at any step, though its grid goes there?

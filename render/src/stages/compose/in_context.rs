@@ -7,7 +7,7 @@ use std::f32::consts::TAU;
 use glam::{Vec2, Vec3, Vec4};
 
 use super::cpu::bytes_of;
-use super::globe::{WATER, beside, daylight, hazy, plain, rim, sunlight};
+use super::globe::{WATER, beside, daylight, hazy, is_hatched, plain, rim, sunlight};
 use super::terrain::{Ground, ground_at, tint};
 use crate::coast::sea_floor;
 use crate::plan::Plan;
@@ -16,7 +16,7 @@ use crate::stages::colour::linear_of;
 use crate::stages::layout::{Axis, GroundAxis, VIEW_GLOBE, VIEW_TILE};
 use crate::stages::params::Params;
 use crate::stages::project::cpu::smoothstep;
-use crate::stages::sphere::{self, ground_below};
+use crate::stages::sphere::{self, ground_below, line_share};
 use crate::stages::water::{is_submerged, mix};
 use ceiling::from_below;
 
@@ -179,6 +179,24 @@ fn lit_plain(
     colour * (1.0 + params.base_map.shading * (slanted - 1.0))
 }
 
+/// Terrain of a globe view in the light of the sun, its sea hatched where the product has no data.
+fn lit_relief(
+    params: &Params,
+    around: &Surroundings<'_>,
+    spot: &Spot,
+    ground: &Ground,
+    pixel: [u32; 2],
+) -> Vec3 {
+    let lit = lit_terrain(params, ground, spot.sun);
+    let place = [spot.ground.lon_rad, spot.ground.lat_rad];
+    if !is_hatched(params, around.domain, place, pixel) {
+        return lit;
+    }
+    let [land, lake, ..] = ground_mask(params, around.coast, pixel);
+    let sea = (1.0 - land) * (1.0 - lake);
+    lit + params.base_map.hatch_over_relief * (sunlight(spot.sun.z) * sea)
+}
+
 fn ground_colour(params: &Params, around: &Surroundings<'_>, spot: &Spot, pixel: [u32; 2]) -> Vec4 {
     let context = &params.context;
     if context.surface == 0 {
@@ -203,7 +221,8 @@ fn ground_colour(params: &Params, around: &Surroundings<'_>, spot: &Spot, pixel:
     let lit = match &ground {
         _ if !spot.on_ground => rim(params, &spot.ground),
         Some(ground) if context.terrain_on == 1 => {
-            hazy(params, lit_terrain(params, ground, spot.sun), &spot.ground)
+            let lit = lit_relief(params, around, spot, ground, pixel);
+            hazy(params, lit, &spot.ground)
         }
         floor => {
             let lit = lit_plain(params, around, spot, floor.as_ref(), pixel);
@@ -231,14 +250,27 @@ fn trail_colour(params: &Params, trails: &[u32], pixel: [u32; 2]) -> Vec4 {
 pub fn hidden_share(params: &Params, coast: &[u32], trails: &[u32], pixel: [u32; 2]) -> u32 {
     let mut kept = 255;
     if params.context.land_hides == 1 {
-        let [x, y] = in_picture(params, pixel);
-        kept -= coast[(y * params.context.coast_row_words + x) as usize] & 255;
+        kept -= land_share(params, coast, pixel);
     }
     if params.context.trails_on == 1 {
         let clear = 255 - (trail_word(params, trails, pixel) >> 24);
         kept = (kept * clear * clear + 32512) / 65025;
     }
     255 - kept
+}
+
+/// Share of land in a pixel of a globe view in 255 parts.
+fn land_share(params: &Params, coast: &[u32], pixel: [u32; 2]) -> u32 {
+    let [x, y] = in_picture(params, pixel);
+    coast[(y * params.context.coast_row_words + x) as usize] & 255
+}
+
+/// Share of a pixel that shows values: what is not land, where land is masked.
+fn unmasked_share(params: &Params, coast: &[u32], pixel: [u32; 2]) -> f32 {
+    if params.context.land_masked == 0 {
+        return 1.0;
+    }
+    (255 - land_share(params, coast, pixel)) as f32 / 255.0
 }
 
 /// What lies in a pixel of a globe view: shares of land, lakes, shores and borders.
@@ -254,7 +286,13 @@ fn in_picture(params: &Params, pixel: [u32; 2]) -> [u32; 2] {
     [pixel[0] + origin.x as u32, pixel[1] + origin.y as u32]
 }
 
-fn coast_colour(params: &Params, coast: &[u32], pixel: [u32; 2], covered: f32) -> Vec4 {
+fn coast_colour(
+    params: &Params,
+    coast: &[u32],
+    spot: &Spot,
+    pixel: [u32; 2],
+    covered: f32,
+) -> Vec4 {
     let context = &params.context;
     if context.coast_on == 0 {
         return Vec4::ZERO;
@@ -262,7 +300,8 @@ fn coast_colour(params: &Params, coast: &[u32], pixel: [u32; 2], covered: f32) -
     let grey = |grey: f32| Vec3::splat(grey).extend(1.0);
     if params.view.kind == VIEW_GLOBE {
         let map = &params.base_map;
-        let [.., shore, border] = ground_mask(params, coast, pixel);
+        let seen = line_share(&spot.ground);
+        let [.., shore, border] = ground_mask(params, coast, pixel).map(|share| share * seen);
         let mix = |a: f32, b: f32| a * (1.0 - covered) + b * covered;
         let shore = shore * mix(context.coast_alpha, map.over_coast_alpha);
         let border = border * mix(map.border_alpha, map.over_border_alpha);
@@ -284,21 +323,33 @@ fn over(line: Vec4, colour: Vec4, is_above: bool) -> Vec4 {
 }
 
 /// Isoline and graticule of a pixel on the sea surface.
-fn surface_lines(params: &Params, lines: &[u32], [x, y]: [u32; 2], covered: f32) -> [Vec4; 2] {
+fn surface_lines(
+    params: &Params,
+    around: &Surroundings<'_>,
+    pixel: [u32; 2],
+    covered: f32,
+) -> [Vec4; 2] {
     let context = &params.context;
     if context.lines_on == 0 {
         return [Vec4::ZERO; 2];
     }
-    let word = lines[(y * params.view.size_px.x + x) as usize];
+    let word = around.lines[(pixel[1] * params.view.size_px.x + pixel[0]) as usize];
     let grey = |grey: f32| Vec3::splat(grey).extend(1.0);
-    let isoline = grey((word >> 12 & 255) as f32 / 255.0) * ((word & 4095) as f32 / 4095.0);
+    let cover = (word & 4095) as f32 / 4095.0 * unmasked_share(params, around.coast, pixel);
+    let isoline = grey((word >> 12 & 255) as f32 / 255.0) * cover;
     let own = context.graticule_grey * (1.0 - covered) + params.base_map.over_grey * covered;
     let graticule = grey(own) * ((word >> 20) as f32 / 4095.0 * context.graticule_alpha);
     [isoline, graticule]
 }
 
-fn with_lines(params: &Params, lines: &[u32], pixel: [u32; 2], colour: Vec4, covered: f32) -> Vec4 {
-    let [isoline, graticule] = surface_lines(params, lines, pixel, covered);
+fn with_lines(
+    params: &Params,
+    around: &Surroundings<'_>,
+    pixel: [u32; 2],
+    colour: Vec4,
+    covered: f32,
+) -> Vec4 {
+    let [isoline, graticule] = surface_lines(params, around, pixel, covered);
     let through = over(isoline * params.context.isolines_through, colour, true);
     let shown = over(isoline, through, false);
     over(graticule, shown, params.context.coast_above == 1)
@@ -327,7 +378,7 @@ fn composed(
     } else {
         spot_on_globe(params, pixel)
     };
-    let mut colour = blended;
+    let mut colour = blended * unmasked_share(params, around.coast, pixel);
     if params.context.night_on == 1 {
         let day = smoothstep(-0.15, 0.35, spot.sun.z);
         colour = (colour.truncate() * (NIGHT * (1.0 - day) + day)).extend(colour.w);
@@ -343,8 +394,8 @@ fn composed(
     if params.context.coast_above == 1 {
         colour = over(trail, colour, true);
     }
-    colour = with_lines(params, around.lines, pixel, colour, covered);
-    let line = coast_colour(params, around.coast, pixel, covered);
+    colour = with_lines(params, around, pixel, colour, covered);
+    let line = coast_colour(params, around.coast, &spot, pixel, covered);
     colour = over(line, colour, params.context.coast_above == 1);
     if params.context.coast_above == 0 {
         colour = over(trail, colour, false);

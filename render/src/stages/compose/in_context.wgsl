@@ -3,7 +3,7 @@
 struct ContextParams {
     surface: u32, has_water: u32, night_on: u32, terrain_on: u32, sea_floor_on: u32, terrain_slope: f32, seabed_per_m: f32, coast_on: u32,
     coast_above: u32, coast_grey: f32, coast_alpha: f32, coast_row_words: u32, land_hides: u32, lines_on: u32, isolines_through: f32,
-    graticule_grey: f32, graticule_alpha: f32, trails_on: u32, trails_row_px: u32,
+    graticule_grey: f32, graticule_alpha: f32, trails_on: u32, trails_row_px: u32, land_masked: u32,
 }
 @group(0) @binding(27) var<uniform> context: ContextParams;
 @group(0) @binding(5) var<storage, read> terrain: array<f32>;
@@ -18,6 +18,7 @@ fn has_surface() -> bool { return feature(HAS_SURFACE, context.surface == 1u); }
 fn has_terrain() -> bool { return feature(HAS_TERRAIN, context.terrain_on == 1u); }
 fn has_coast_above() -> bool { return feature(HAS_COAST_ABOVE, context.coast_above == 1u); }
 fn has_trails() -> bool { return feature(HAS_TRAILS, context.trails_on == 1u); }
+fn masks_land() -> bool { return feature(MASKS_LAND, context.land_masked == 1u); }
 fn land_hides() -> bool { return feature(LAND_HIDES, context.land_hides == 1u); }
 
 // Light on a thematic map where it is night.
@@ -90,6 +91,15 @@ fn lit_plain(spot: Spot, floor: Terrain, pixel: vec2<u32>) -> vec3<f32> {
     return colour * (1.0 + base_map.shading * (slanted - 1.0));
 }
 
+// Terrain of a globe view in the light of the sun, its sea hatched where the product has no data.
+fn lit_relief(spot: Spot, ground: Terrain, pixel: vec2<u32>) -> vec3<f32> {
+    let lit = lit_terrain(ground, spot.sun);
+    if (!is_hatched(spot.ground.lon, spot.ground.lat, pixel)) { return lit; }
+    let shares = ground_mask(pixel).xy;
+    let sea = (1.0 - shares.x) * (1.0 - shares.y);
+    return lit + base_map.hatch_over_relief * (sunlight(spot.sun.z) * sea);
+}
+
 fn ground_colour(spot: Spot, pixel: vec2<u32>) -> vec4<f32> {
     if (!has_surface()) { return vec4(0.0); }
     var ground: Terrain;
@@ -107,7 +117,7 @@ fn ground_colour(spot: Spot, pixel: vec2<u32>) -> vec4<f32> {
     if (!spot.on_ground) {
         lit = rim(spot.ground);
     } else if (ground.is_known && has_terrain()) {
-        lit = hazy(lit_terrain(ground, spot.sun), spot.ground);
+        lit = hazy(lit_relief(spot, ground, pixel), spot.ground);
     } else {
         lit = hazy(lit_plain(spot, ground, pixel), spot.ground);
     }
@@ -152,10 +162,10 @@ fn ground_mask(pixel: vec2<u32>) -> vec4<f32> {
 }
 
 // Coast lines, below them borders; `covered` is how much of what lies below has colours of its own.
-fn coast_colour(pixel: vec2<u32>, covered: f32) -> vec4<f32> {
+fn coast_colour(spot: Spot, pixel: vec2<u32>, covered: f32) -> vec4<f32> {
     if (!feature(HAS_COAST, context.coast_on == 1u)) { return vec4(0.0); }
     if (!is_tile()) {
-        let mask = ground_mask(pixel);
+        let mask = ground_mask(pixel) * line_share(spot.ground);
         let shore = mask.z * mix(context.coast_alpha, base_map.over_coast_alpha, covered);
         let border = mask.w * mix(base_map.border_alpha, base_map.over_border_alpha, covered);
         let greys = mix(vec2(context.coast_grey, base_map.border_grey), vec2(base_map.over_grey), covered);
@@ -173,13 +183,19 @@ fn over(line: vec4<f32>, colour: vec4<f32>, is_above: bool) -> vec4<f32> {
     return colour + line * (1.0 - colour.w);
 }
 
+// Share of a pixel that shows values: what is not land, where land is masked.
+fn unmasked_share(pixel: vec2<u32>) -> f32 {
+    if (!masks_land()) { return 1.0; }
+    return f32(255u - land_share(pixel)) / 255.0;
+}
+
 // Lines of a pixel on the sea surface; `covered` is how much of what lies below has colours of its own.
 struct SurfaceLines { isoline: vec4<f32>, graticule: vec4<f32> }
 
 fn surface_lines(pixel: vec2<u32>, covered: f32) -> SurfaceLines {
     if (!feature(HAS_LINES, context.lines_on == 1u)) { return SurfaceLines(vec4(0.0), vec4(0.0)); }
     let word = lines[pixel.y * view.size_px.x + pixel.x];
-    let isoline = vec4(vec3(f32((word >> 12u) & 255u) / 255.0), 1.0) * (f32(word & 4095u) / 4095.0);
+    let isoline = vec4(vec3(f32((word >> 12u) & 255u) / 255.0), 1.0) * (f32(word & 4095u) / 4095.0 * unmasked_share(pixel));
     let grey = mix(context.graticule_grey, base_map.over_grey, covered);
     return SurfaceLines(isoline, vec4(vec3(grey), 1.0) * (f32(word >> 20u) / 4095.0 * context.graticule_alpha));
 }
@@ -197,7 +213,7 @@ struct InContext { colour: vec4<f32>, is_beside: bool }
 fn in_context(pixel: vec2<u32>, blended: vec4<f32>) -> InContext {
     var spot: Spot;
     if (is_tile()) { spot = spot_on_tile(pixel); } else { spot = spot_on_globe(pixel); }
-    var colour = blended;
+    var colour = blended * unmasked_share(pixel);
     if (feature(HAS_NIGHT, context.night_on == 1u)) {
         colour = vec4(colour.xyz * mix(NIGHT, 1.0, smoothstep(-0.15, 0.35, spot.sun.z)), colour.w);
     }
@@ -207,7 +223,7 @@ fn in_context(pixel: vec2<u32>, blended: vec4<f32>) -> InContext {
     let trail = trail_colour(pixel);
     if (has_coast_above()) { colour = over(trail, colour, true); }
     colour = with_lines(pixel, colour, covered);
-    let line = coast_colour(pixel, covered);
+    let line = coast_colour(spot, pixel, covered);
     colour = over(line, colour, has_coast_above());
     if (!has_coast_above()) { colour = over(trail, colour, false); }
     colour += ground_colour(spot, pixel) * (1.0 - colour.w);

@@ -35,5 +35,7 @@ shared_struct! {
         pub trails_on: u32,
         /// Pixels in a row of the whole picture.
         pub trails_row_px: u32,
+        /// 1: a thematic map and isolines end at the coasts of a globe view.
+        pub land_masked: u32,
     }
 }

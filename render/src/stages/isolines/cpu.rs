@@ -5,15 +5,16 @@ use glam::{Vec2, Vec3};
 use super::params::Isoline;
 use crate::plan::Plan;
 use crate::scene::Scene;
-use crate::stages::layout::{Axis, GroundAxis, VIEW_TILE, is_missing, nearest};
+use crate::stages::layout::{Axis, GroundAxis, MISSING, VIEW_TILE, is_missing, nearest};
 use crate::stages::map::cpu::{cell_at, col_of, row_of};
 use crate::stages::params::Params;
 use crate::stages::particles::cpu::share_of;
-use crate::stages::sphere::ground_below;
+use crate::stages::sphere::{ground_below, line_share};
 
 const CROWDED: f32 = 0.2;
 const TOO_CROWDED: f32 = 0.5;
 const RIM_PER_PX: f32 = 0.3;
+const LEAST_LOOP_PX: f32 = 3.0;
 const FLAT_PX: f32 = 10000.0;
 
 /// What the stage reads.
@@ -41,12 +42,37 @@ impl<'a> Inputs<'a> {
     }
 }
 
-/// The value at a place over the range of colours, and its change for each column and row.
+/// A place between centres of cells, the value there over the range of colours, and its change for each column and row.
 #[derive(Debug, Clone, Copy)]
 struct FieldAt {
+    x: Axis,
+    y: Axis,
     value: f32,
     per_col: f32,
     per_row: f32,
+}
+
+/// How a field lies on the screen: what its value changes by over a pixel, the size of a cell, and how much is seen of lines.
+struct OnScreen {
+    slope: f32,
+    cell_px: Vec2,
+    inside: f32,
+}
+
+impl OnScreen {
+    /// `slope_of`: what changes so much for each radian east and north changes so much over a pixel.
+    fn of(params: &Params, field: &FieldAt, slope_of: impl Fn(Vec2) -> f32, inside: f32) -> Self {
+        let grid = &params.grid;
+        let cells_per_px = Vec2::new(
+            slope_of(Vec2::new(grid.cols_per_rad, 0.0)),
+            slope_of(Vec2::new(0.0, grid.rows_per_rad)),
+        );
+        Self {
+            slope: slope_of(per_rad_of(params, field)),
+            cell_px: 1.0 / cells_per_px.max(Vec2::splat(1.0e-20)),
+            inside,
+        }
+    }
 }
 
 /// The lines of every pixel.
@@ -63,10 +89,14 @@ fn one(params: &Params, inputs: &Inputs<'_>, [x, y]: [u32; 2]) -> u32 {
     if params.view.kind == VIEW_TILE {
         let (col, row) = (x as usize, (params.view.size_px.x + y) as usize);
         let field = field_at(params, inputs, [inputs.axes[col], inputs.axes[row]]);
+        let slope = |per_rad| slope_on_tile(params, per_rad, inputs.ground_axes[row].cos);
         return field.map_or(0, |field| {
-            let per_rad = per_rad_of(params, field);
-            let slope = slope_on_tile(params, per_rad, inputs.ground_axes[row].cos);
-            line_of(inputs.levels, field, slope, 1.0)
+            line_of(
+                params,
+                inputs,
+                &field,
+                &OnScreen::of(params, &field, slope, 1.0),
+            )
         });
     }
     let hit = ground_below(params, [x, y]);
@@ -74,17 +104,17 @@ fn one(params: &Params, inputs: &Inputs<'_>, [x, y]: [u32; 2]) -> u32 {
         return 0;
     }
     let slope = |per_rad: Vec2| slope_on_globe(params, per_rad, hit.normal);
-    let inside = (hit.rim_px * RIM_PER_PX - 0.5).clamp(0.0, 1.0);
+    let inside = (hit.rim_px * RIM_PER_PX - 0.5).clamp(0.0, 1.0) * line_share(&hit);
     let mut word = 0;
     if params.isolines.count > 0 {
         let place = [col_of(params, hit.lon_rad), row_of(params, hit.lat_rad)];
         let field = field_at(params, inputs, place);
         word = field.map_or(0, |field| {
             line_of(
-                inputs.levels,
-                field,
-                slope(per_rad_of(params, field)),
-                inside,
+                params,
+                inputs,
+                &field,
+                &OnScreen::of(params, &field, slope, inside),
             )
         });
     }
@@ -128,13 +158,15 @@ fn field_at(params: &Params, inputs: &Inputs<'_>, [x, y]: [Axis; 2]) -> Option<F
     let down = south - north;
     let value = sum.x / sum.z;
     Some(FieldAt {
+        x,
+        y,
         value,
         per_col: (east.x - value * east.z) / sum.z,
         per_row: (down.x - value * down.z) / sum.z,
     })
 }
 
-fn per_rad_of(params: &Params, field: FieldAt) -> Vec2 {
+fn per_rad_of(params: &Params, field: &FieldAt) -> Vec2 {
     let grid = &params.grid;
     Vec2::new(
         field.per_col * grid.cols_per_rad,
@@ -173,17 +205,87 @@ fn graticule_of(params: &Params, angle: f32, slope: f32) -> f32 {
     (own.graticule_half_px + 0.5 - off_px).clamp(0.0, 1.0) * crowd(per_px)
 }
 
-fn line_of(levels: &[Isoline], field: FieldAt, slope: f32, inside: f32) -> u32 {
+/// Value of a cell over the range of colours, or none.
+fn value_of(params: &Params, inputs: &Inputs<'_>, row: i32, col: i32) -> f32 {
+    let own = cell_value(params, inputs, row, col);
+    if own.z <= 0.0 { MISSING } else { own.x / own.z }
+}
+
+/// Of the four cells round a place the one that alone lies on its side of a level: its number.
+fn lone_corner(params: &Params, inputs: &Inputs<'_>, field: &FieldAt, level: f32) -> Option<i32> {
+    let (mut above, mut below) = (0, 0);
+    let (mut high, mut low) = (0, 0);
+    for i in 0..4 {
+        let (row, col) = (field.y.index + i / 2, field.x.index + i % 2);
+        let own = value_of(params, inputs, row, col);
+        if is_missing(own) {
+            continue;
+        }
+        if own > level {
+            (above, high) = (above + 1, i);
+        } else {
+            (below, low) = (below + 1, i);
+        }
+    }
+    match (above, below) {
+        (1, _) => Some(high),
+        (_, 1) => Some(low),
+        _ => None,
+    }
+}
+
+/// How much is drawn of a line at a place: less of one that runs round a single cell, a dot where it is small.
+fn loop_share(
+    params: &Params,
+    inputs: &Inputs<'_>,
+    field: &FieldAt,
+    level: f32,
+    cell_px: Vec2,
+) -> f32 {
+    let Some(corner) = lone_corner(params, inputs, field, level) else {
+        return 1.0;
+    };
+    let (row, col) = (field.y.index + corner / 2, field.x.index + corner % 2);
+    let own = value_of(params, inputs, row, col);
+    let mut cells = Vec2::ZERO;
+    for i in (0..9).filter(|i| *i != 4) {
+        let other = value_of(params, inputs, row + i / 3 - 1, col + i % 3 - 1);
+        let is_there = !is_missing(other);
+        if is_there && (other > level) == (own > level) {
+            return 1.0;
+        }
+        if i % 2 == 0 {
+            continue;
+        }
+        let reach = if is_there {
+            (own - level) / (own - other)
+        } else {
+            0.5
+        };
+        if i == 1 || i == 7 {
+            cells.y += reach;
+        } else {
+            cells.x += reach;
+        }
+    }
+    let size_px = (cells * cell_px).max_element();
+    (size_px / LEAST_LOOP_PX - 1.0).clamp(0.0, 1.0)
+}
+
+fn line_of(params: &Params, inputs: &Inputs<'_>, field: &FieldAt, screen: &OnScreen) -> u32 {
     let (mut cover, mut grey) = (0.0, 0.0);
-    for level in levels {
-        let off_px = (field.value - level.value).abs() / slope.max(1.0e-20);
-        let per_px = slope / level.gap;
+    for level in inputs.levels {
+        let off_px = (field.value - level.value).abs() / screen.slope.max(1.0e-20);
+        let per_px = screen.slope / level.gap;
         let steep = (per_px * (2.0 * FLAT_PX) - 1.0).clamp(0.0, 1.0);
-        let own =
+        let mut own =
             (level.half_px + 0.5 - off_px).clamp(0.0, 1.0) * level.alpha * crowd(per_px) * steep;
+        if own > cover {
+            own *= loop_share(params, inputs, field, level.value, screen.cell_px);
+        }
         if own > cover {
             (cover, grey) = (own, level.grey);
         }
     }
-    nearest(cover * inside * 4095.0) as u32 | (nearest(grey * 255.0) as u32) << 12
+    nearest(cover * screen.inside * 4095.0) as u32 | (nearest(grey * 255.0) as u32) << 12
 }

@@ -17,11 +17,17 @@ const CROWDED = 0.2;
 const TOO_CROWDED = 0.5;
 // Lines fade so much for each pixel towards the limb.
 const RIM_PER_PX = 0.3;
+// Pixels across up to which a closed line round a single cell is left out; from twice as many on it is drawn whole.
+const LEAST_LOOP_PX = 3.0;
 // Pixels between lines beyond which they fade, and are gone at twice as many: on a level plain any place is on the line.
 const FLAT_PX = 10000.0;
 
-// The value at a place over the range of colours, and its change for each column and row; without weight where there is no data.
-struct FieldAt { weight: f32, value: f32, per_col: f32, per_row: f32 }
+// A place between centres of cells, the value there over the range of colours, and its change for each column and row; without
+// weight where there is no data.
+struct FieldAt { x: Axis, y: Axis, weight: f32, value: f32, per_col: f32, per_row: f32 }
+
+// How a field lies on the screen: what its value changes by over a pixel, the size of a cell, and how much is seen of lines.
+struct OnScreen { slope: f32, cell_px: vec2<f32>, inside: f32 }
 
 // Value times the share of the cell that holds data, 1, and that share; or zeros where there is no data.
 fn cell_value(row: i32, col: i32) -> vec3<f32> {
@@ -42,6 +48,8 @@ fn field_at(x: Axis, y: Axis) -> FieldAt {
     let south = mix(south_west, south_east, x.fraction);
     let sum = mix(north, south, y.fraction);
     var field: FieldAt;
+    field.x = x;
+    field.y = y;
     if (sum.y < 0.5 || sum.z <= 0.0) { return field; }
     let east = mix(north_east - north_west, south_east - south_west, y.fraction);
     let down = south - north;
@@ -85,27 +93,85 @@ fn graticule_of(angle: f32, slope: f32) -> f32 {
     return clamp(isolines.graticule_half_px + 0.5 - off_px, 0.0, 1.0) * crowd(per_px);
 }
 
+// Value of a cell over the range of colours, or none.
+fn value_of(row: i32, col: i32) -> f32 {
+    let own = cell_value(row, col);
+    if (own.z <= 0.0) { return MISSING; }
+    return own.x / own.z;
+}
+
+// Of the four cells round a place the one that alone lies on its side of a level: its number, or 4.
+fn lone_corner(field: FieldAt, level: f32) -> i32 {
+    var above = 0;
+    var below = 0;
+    var high = 0;
+    var low = 0;
+    for (var i = 0; i < 4; i++) {
+        let own = value_of(field.y.index + i / 2, field.x.index + i % 2);
+        if (is_missing(own)) { continue; }
+        if (own > level) { above++; high = i; } else { below++; low = i; }
+    }
+    if (above == 1) { return high; }
+    if (below == 1) { return low; }
+    return 4;
+}
+
+// How much is drawn of a line at a place: less of one that runs round a single cell, which it calls a dot where it is small.
+// Between neighbours in a row or a column the value is linear, which says how wide and how high the line is round the cell.
+fn loop_share(field: FieldAt, level: f32, cell_px: vec2<f32>) -> f32 {
+    let corner = lone_corner(field, level);
+    if (corner == 4) { return 1.0; }
+    let row = field.y.index + corner / 2;
+    let col = field.x.index + corner % 2;
+    let own = value_of(row, col);
+    var cells = vec2(0.0);
+    for (var i = 0; i < 9; i++) {
+        if (i == 4) { continue; }
+        let other = value_of(row + i / 3 - 1, col + i % 3 - 1);
+        let is_there = !is_missing(other);
+        // It goes on round this one too.
+        if (is_there && (other > level) == (own > level)) { return 1.0; }
+        if (i % 2 == 0) { continue; }
+        var reach = 0.5;
+        if (is_there) { reach = (own - level) / (own - other); }
+        if (i == 1 || i == 7) { cells.y += reach; } else { cells.x += reach; }
+    }
+    let size_px = max(cells.x * cell_px.x, cells.y * cell_px.y);
+    return clamp(size_px / LEAST_LOOP_PX - 1.0, 0.0, 1.0);
+}
+
 // Share of a pixel that isolines cover, in the low 12 bits, and their grey in the next 8.
-fn line_of(field: FieldAt, slope: f32, inside: f32) -> u32 {
+fn line_of(field: FieldAt, screen: OnScreen) -> u32 {
     var cover = 0.0;
     var grey = 0.0;
     for (var i = 0u; i < isolines.count; i++) {
         let level = levels[i];
-        let off_px = abs(field.value - level.value) / max(slope, 1.0e-20);
-        let per_px = slope / level.gap;
+        let off_px = abs(field.value - level.value) / max(screen.slope, 1.0e-20);
+        let per_px = screen.slope / level.gap;
         let steep = clamp(per_px * (2.0 * FLAT_PX) - 1.0, 0.0, 1.0);
-        let own = clamp(level.half_px + 0.5 - off_px, 0.0, 1.0) * level.alpha * crowd(per_px) * steep;
+        var own = clamp(level.half_px + 0.5 - off_px, 0.0, 1.0) * level.alpha * crowd(per_px) * steep;
+        if (own > cover) { own *= loop_share(field, level.value, screen.cell_px); }
         if (own > cover) {
             cover = own;
             grey = level.grey;
         }
     }
-    return u32(nearest(cover * inside * 4095.0)) | (u32(nearest(grey * 255.0)) << 12u);
+    return u32(nearest(cover * screen.inside * 4095.0)) | (u32(nearest(grey * 255.0)) << 12u);
 }
 
 // Change of the value for each radian east and north.
 fn per_rad_of(field: FieldAt) -> vec2<f32> {
     return vec2(field.per_col * grid.cols_per_rad, -field.per_row * grid.rows_per_rad);
+}
+
+fn tile_screen(field: FieldAt, cos_lat: f32) -> OnScreen {
+    let cells_per_px = vec2(slope_on_tile(vec2(grid.cols_per_rad, 0.0), cos_lat), slope_on_tile(vec2(0.0, grid.rows_per_rad), cos_lat));
+    return OnScreen(slope_on_tile(per_rad_of(field), cos_lat), 1.0 / max(cells_per_px, vec2(1.0e-20)), 1.0);
+}
+
+fn globe_screen(field: FieldAt, normal: vec3<f32>, inside: f32) -> OnScreen {
+    let cells_per_px = vec2(slope_on_globe(vec2(grid.cols_per_rad, 0.0), normal), slope_on_globe(vec2(0.0, grid.rows_per_rad), normal));
+    return OnScreen(slope_on_globe(per_rad_of(field), normal), 1.0 / max(cells_per_px, vec2(1.0e-20)), inside);
 }
 
 @compute @workgroup_size(SCREEN_TILE_PX, SCREEN_TILE_PX)
@@ -115,18 +181,17 @@ fn draw_lines(@builtin(global_invocation_id) pixel: vec3<u32>) {
     lines[at] = 0u;
     if (is_tile()) {
         let field = field_at(axes[pixel.x], axes[view.size_px.x + pixel.y]);
-        let slope = slope_on_tile(per_rad_of(field), ground_axes[view.size_px.x + pixel.y].cos);
-        if (field.weight > 0.0) { lines[at] = line_of(field, slope, 1.0); }
+        if (field.weight > 0.0) { lines[at] = line_of(field, tile_screen(field, ground_axes[view.size_px.x + pixel.y].cos)); }
         return;
     }
     let hit = ground_below(pixel.xy);
     if (!hit.on_ground) { return; }
     var word = 0u;
     // At the limb a pixel reaches far.
-    let inside = clamp(hit.rim_px * RIM_PER_PX - 0.5, 0.0, 1.0);
+    let inside = clamp(hit.rim_px * RIM_PER_PX - 0.5, 0.0, 1.0) * line_share(hit);
     if (isolines.count > 0u) {
         let field = field_at(col_of(hit.lon), row_of(hit.lat));
-        if (field.weight > 0.0) { word = line_of(field, slope_on_globe(per_rad_of(field), hit.normal), inside); }
+        if (field.weight > 0.0) { word = line_of(field, globe_screen(field, hit.normal, inside)); }
     }
     if (isolines.graticule_per_rad > 0.0) {
         let meridian = graticule_of(hit.lon, slope_on_globe(vec2(1.0, 0.0), hit.normal));

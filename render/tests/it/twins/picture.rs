@@ -7,6 +7,7 @@ use render::frame_context::FrameContext;
 use render::gpu::{Gpu, Slot};
 use render::stages::compose::{self, Compose};
 use render::stages::eye::{self, Eye};
+use render::stages::layout::VIEW_TILE;
 use render::stages::map::{self, Map, plain};
 
 use super::seeing::eye_image;
@@ -219,7 +220,7 @@ fn what_is_seen_from_below_the_sea_matches_its_twin() {
                 "plain(0.3 + spot.ground.lon, spot",
             ),
             ("nearest_at + half_chord", "nearest_at - half_chord"),
-            ("over(coast_colour(pixel, 0.0), seen, true)", "seen"),
+            ("over(coast_colour(spot, pixel, 0.0), seen, true)", "seen"),
         ] {
             prove("compose", compose::SOURCE, right, wrong, |gpu, source| {
                 let stage = Compose::new(gpu, source);
@@ -249,6 +250,15 @@ fn surroundings_match_their_twin_on_tiles_and_on_the_globe() {
             "covered = 0.0 * max(covered, colour.w)",
         ),
     ];
+    // Hatched sea and fading lines are of globes.
+    let of_globe = [
+        ("hatch_over_relief *", "hatch_over_relief * 0.0 *"),
+        ("(1.0 - shares.x) * (1.0 - shares.y)", "1.0"),
+        (
+            "ground_mask(pixel) * line_share(spot.ground)",
+            "ground_mask(pixel)",
+        ),
+    ];
     let faults = [
         // The slope of the terrain, its height, the night, the sea above the floor; the coast.
         ("2.0 * z[at + 4]", "2.0 * z[at - 4]"),
@@ -260,7 +270,10 @@ fn surroundings_match_their_twin_on_tiles_and_on_the_globe() {
         let twins = Twins::of_job(&everything(Mode::Map, view), with_terrain(FIVE_DEGREES));
         assert!(twins.params.in_context);
         let expected = bytes(twins.image.iter().copied());
-        for (right, wrong) in faults.into_iter().chain([line]) {
+        let of_globe = of_globe
+            .into_iter()
+            .filter(|_| twins.params.view.kind != VIEW_TILE);
+        for (right, wrong) in faults.into_iter().chain([line]).chain(of_globe) {
             let distance = |gpu: &Gpu, source: &str| {
                 let stage = Compose::new(gpu, source);
                 let picture = |f: &mut FrameContext<'_>| {

@@ -3809,6 +3809,11 @@ export interface operations {
                  *     takes its place.
                  */
                 sea_floor?: boolean;
+                /**
+                 * @description A thematic map (`map`) and its isolines end at coasts, by the share of land in every pixel; no unless told otherwise, as
+                 *     cells are whole. Lakes count as land. Other modes refuse it.
+                 */
+                mask_land?: boolean;
                 /** @description Colours of the plain globe; dark unless told otherwise. */
                 base_map?: components["schemas"]["BaseMap"];
                 /** @description What is seen beside the globe; none unless told otherwise, which leaves it transparent. */

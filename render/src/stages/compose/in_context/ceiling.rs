@@ -32,9 +32,13 @@ fn ceiling_colour(
         seen = blended + seen * (1.0 - blended.w);
     }
     seen = over(trail_colour(params, around.trails, pixel), seen, true);
-    let [isoline, graticule] = surface_lines(params, around.lines, pixel, 0.0);
+    let [isoline, graticule] = surface_lines(params, around, pixel, 0.0);
     seen = over(isoline, over(graticule, seen, true), true);
-    seen = over(coast_colour(params, around.coast, pixel, 0.0), seen, true);
+    seen = over(
+        coast_colour(params, around.coast, spot, pixel, 0.0),
+        seen,
+        true,
+    );
     let water = water_before(params, spot) * seen.w;
     mix(water, seen.truncate(), kept_over(params, ground.way)).extend(seen.w)
 }

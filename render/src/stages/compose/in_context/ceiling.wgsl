@@ -17,7 +17,7 @@ fn ceiling_colour(spot: Spot, pixel: vec2<u32>, blended: vec4<f32>) -> vec4<f32>
     seen = over(trail_colour(pixel), seen, true);
     let own = surface_lines(pixel, 0.0);
     seen = over(own.isoline, over(own.graticule, seen, true), true);
-    seen = over(coast_colour(pixel, 0.0), seen, true);
+    seen = over(coast_colour(spot, pixel, 0.0), seen, true);
     return vec4(mix(water_before(spot) * seen.w, seen.xyz, kept_over(spot.ground.way)), seen.w);
 }
 
