@@ -24,6 +24,7 @@ use crate::cited::Cited;
 use crate::grid::LonLatDeg;
 use crate::product::ProductId;
 use crate::series::{Cell, RegionSeriesQuery};
+use crate::statistics::MinCoverage;
 use crate::time::{TimeMs, TimeStep};
 
 pub use base::BasePeriod;
@@ -99,7 +100,7 @@ impl FromStr for AnalysisPart {
 }
 
 /// What is asked of a series.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AnalysisOptions {
     /// What is made of it: something, in the order of [`AnalysisPart`], nothing twice.
     pub parts: Vec<AnalysisPart>,
@@ -109,6 +110,8 @@ pub struct AnalysisOptions {
     pub bins: CalendarBins,
     /// Means that a trend is drawn through.
     pub trend_step: TimeStep,
+    /// Least share of a region's sea that a step must hold data over; those with less are left out.
+    pub min_coverage: MinCoverage,
 }
 
 impl AnalysisOptions {
@@ -131,6 +134,7 @@ impl AnalysisOptions {
             base: None,
             bins: CalendarBins::default(),
             trend_step: Self::USUAL_STEP,
+            min_coverage: MinCoverage::default(),
         })
     }
 }
@@ -243,9 +247,15 @@ pub struct SeriesAnalysis {
     pub end: TimeMs,
     /// Steps that were read.
     pub step_count: u64,
-    /// Steps of them that hold data.
+    /// Steps of them that hold data and were not left out.
     pub value_count: u64,
-    /// What may surprise: how the region was taken, steps that cover little of it.
+    /// Least share of a region's sea that a step had to hold data over, percent.
+    #[serde(default)]
+    pub min_coverage_percent: f64,
+    /// Steps that hold data over less than that, and were left out.
+    #[serde(default)]
+    pub left_out_count: u64,
+    /// What may surprise: how the region was taken, steps that cover little of it or were left out, steps without data.
     pub notes: Vec<String>,
     /// What was asked for and cannot be said, and why.
     pub refused: Vec<Refused>,

@@ -34,6 +34,35 @@ pub struct BandSum {
     pub weighted: f64,
     /// Area of cells with data, m².
     pub area_m2: f64,
+    /// Squares of how far values are from their mean, by area; 0 where they are not asked for.
+    pub squares: f64,
+}
+
+impl BandSum {
+    /// Adds the sum of a step that lasts so long, s; areas are of time too then. Sums are added in the order of time, so that they
+    /// have the same bits each time.
+    ///
+    /// Source: Chan, Golub and LeVeque (1983), doi:10.1080/00031305.1983.10483115.
+    pub fn add(&mut self, step: &Self, seconds: f64) {
+        let (own, more) = (self.area_m2, step.area_m2 * seconds);
+        if own > 0.0 && more > 0.0 {
+            let apart = self.weighted / own - step.weighted / step.area_m2;
+            self.squares += apart * apart * (own * more / (own + more));
+        }
+        self.squares += step.squares * seconds;
+        self.weighted += step.weighted * seconds;
+        self.area_m2 += more;
+    }
+
+    /// Mean of the values; none without any.
+    pub fn mean(&self) -> Option<f64> {
+        (self.area_m2 > 0.0).then(|| self.weighted / self.area_m2)
+    }
+
+    /// Their standard deviation, where squares were asked for; none without any.
+    pub fn std(&self) -> Option<f64> {
+        (self.area_m2 > 0.0).then(|| (self.squares / self.area_m2).sqrt())
+    }
 }
 
 impl Bands {
@@ -121,6 +150,29 @@ impl Bands {
     /// of rows and of columns in each, so that the same field has the same bits.
     pub fn sums(&self, windows: &[Window], values: &[Vec<f32>]) -> Vec<BandSum> {
         let mut sums = vec![BandSum::default(); self.edges_deg.len()];
+        self.each(windows, values, |band, value, area_m2| {
+            sums[band].weighted += area_m2 * value;
+            sums[band].area_m2 += area_m2;
+        });
+        sums
+    }
+
+    /// The same with squares about the mean of each band.
+    pub fn sums_with_squares(&self, windows: &[Window], values: &[Vec<f32>]) -> Vec<BandSum> {
+        let mut sums = self.sums(windows, values);
+        let means: Vec<f64> = sums
+            .iter()
+            .map(|sum| sum.mean().unwrap_or_default())
+            .collect();
+        self.each(windows, values, |band, value, area_m2| {
+            let apart = value - means[band];
+            sums[band].squares += area_m2 * apart * apart;
+        });
+        sums
+    }
+
+    /// Hands over the band, the value and the area of each cell that has a value in a band, row by row.
+    fn each(&self, windows: &[Window], values: &[Vec<f32>], mut take: impl FnMut(usize, f64, f64)) {
         for row in self.rows.clone() {
             let area_m2 = self.area_m2[row as usize];
             for (window, values) in windows.iter().zip(values) {
@@ -134,14 +186,12 @@ impl Bands {
                         Along::Lat => row as usize,
                         Along::Lon => col,
                     };
-                    if let Some(sum) = self.band_of[at].and_then(|band| sums.get_mut(band)) {
-                        sum.weighted += area_m2 * f64::from(*value);
-                        sum.area_m2 += area_m2;
+                    if let Some(band) = self.band_of[at] {
+                        take(band, f64::from(*value), area_m2);
                     }
                 }
             }
         }
-        sums
     }
 }
 
@@ -158,11 +208,17 @@ mod tests {
         dlon_deg: 1.0,
     };
 
-    /// Sums of a whole field.
-    fn sums(bands: &Bands, values: &[f32]) -> Vec<BandSum> {
+    /// A whole field by the windows of some bands.
+    fn in_windows(bands: &Bands, values: &[f32]) -> (Vec<Window>, Vec<Vec<f32>>) {
         let windows = bands.windows();
         let of = |window: &Window| window.cell_indices(&GRID).map(|at| values[at]).collect();
-        let values: Vec<Vec<f32>> = windows.iter().map(of).collect();
+        let values = windows.iter().map(of).collect();
+        (windows, values)
+    }
+
+    /// Sums of a whole field.
+    fn sums(bands: &Bands, values: &[f32]) -> Vec<BandSum> {
+        let (windows, values) = in_windows(bands, values);
         bands.sums(&windows, &values)
     }
 
@@ -187,6 +243,45 @@ mod tests {
         assert!((sums[1].weighted / sums[1].area_m2 / upper - 1.0).abs() < 1e-12);
         let all = Grid { rows: 4, ..GRID }.cell_area_m2(0, Earth::Sphere);
         assert!((sums[1].area_m2 / (all * (6.0 + 5.0 * b / a)) - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn spreads_of_steps_come_to_that_of_all_values_by_area_and_time() {
+        // Far from zero, where a difference of sums of squares would have no digit left.
+        let at = |i: usize, step: usize| 1e6 + ((i * 7 + step * 5) % 11) as f32;
+        let values = |step: usize| -> Vec<f32> { (0..24).map(|i| at(i, step)).collect() };
+        let whole = [-180.0, -90.0, 180.0, 90.0];
+        let bands = Bands::of(&GRID, Along::Lat, 2.0, whole, Earth::Wgs84);
+        let mut all = BandSum::default();
+        let steps = [(0, 10.0), (1, 30.0), (2, 1.0)];
+        for (step, seconds) in steps {
+            let (windows, values) = in_windows(&bands, &values(step));
+            all.add(&bands.sums_with_squares(&windows, &values)[1], seconds);
+        }
+        // Rows 0 and 1 make the northern band.
+        let weighed = || {
+            steps.into_iter().flat_map(|(step, seconds)| {
+                (0..12).map(move |i| {
+                    let weight = GRID.cell_area_m2(i as u32 / 6, Earth::Wgs84) * seconds;
+                    (f64::from(at(i, step)), weight)
+                })
+            })
+        };
+        let weight: f64 = weighed().map(|(_, weight)| weight).sum();
+        let mean = weighed().map(|(value, weight)| value * weight).sum::<f64>() / weight;
+        let squares: f64 = weighed()
+            .map(|(value, weight)| weight * (value - mean).powi(2))
+            .sum();
+        assert!((all.mean().unwrap() / mean - 1.0).abs() < 1e-12);
+        let std = (squares / weight).sqrt();
+        assert!(
+            (all.std().unwrap() / std - 1.0).abs() < 1e-9,
+            "{all:?} {std}"
+        );
+        assert_eq!(
+            (BandSum::default().mean(), BandSum::default().std()),
+            (None, None)
+        );
     }
 
     #[test]

@@ -8,7 +8,8 @@ use contract::chunk::Window;
 use contract::cited::Cited;
 use contract::grid::Grid;
 use contract::manifest::{Manifest, Step};
-use contract::time::Period;
+use contract::quantity::Display;
+use contract::time::{Period, TimeStep};
 use cube::Values;
 use futures::TryStreamExt as _;
 use futures::future::BoxFuture;
@@ -64,27 +65,12 @@ pub fn hovmoller<'a>(
         }
         let bands = Arc::new(bands);
         let areas_m2 = domain_areas(store, manifest, &bands).await?;
-        let sums = sums_in(store, manifest, &steps, &bands, &bins).await?;
+        // One row of all is a profile, which is told with its spread.
+        let with_stds = step == TimeStep::Total;
+        let sums = sums_in(store, manifest, &steps, &bands, (&bins[..], with_stds)).await?;
         let display = manifest.quantity.display();
-        let row = |(bin, sums): (&Period, &Vec<BandSum>)| HovmollerRow {
-            start: bin.start,
-            end: bin.end,
-            means: sums
-                .iter()
-                .map(|sum| (sum.area_m2 > 0.0).then(|| display.shown(sum.weighted / sum.area_m2)))
-                .collect(),
-            coverage_percent: sums
-                .iter()
-                .zip(&areas_m2)
-                .map(|(sum, area_m2)| {
-                    let all = area_m2 * bin.seconds();
-                    if all > 0.0 {
-                        (100.0 * sum.area_m2 / all).min(100.0)
-                    } else {
-                        0.0
-                    }
-                })
-                .collect(),
+        let row = |(bin, sums): (&Period, &Vec<BandSum>)| {
+            row(*bin, sums, &areas_m2, (display, with_stds))
         };
         let band = |((low_deg, high_deg), area_m2): (&(f64, f64), &f64)| HovmollerBand {
             low_deg: *low_deg,
@@ -102,6 +88,32 @@ pub fn hovmoller<'a>(
             rows: bins.iter().zip(&sums).map(row).collect(),
         })
     })
+}
+
+/// A row of the sums of bands whose areas with data are `areas_m2`.
+fn row(
+    bin: Period,
+    sums: &[BandSum],
+    areas_m2: &[f64],
+    (display, with_stds): (Display, bool),
+) -> HovmollerRow {
+    let coverage_percent = |(sum, area_m2): (&BandSum, &f64)| {
+        let all = area_m2 * bin.seconds();
+        if all > 0.0 {
+            (100.0 * sum.area_m2 / all).min(100.0)
+        } else {
+            0.0
+        }
+    };
+    let mean = |sum: &BandSum| sum.mean().map(|mean| display.shown(mean));
+    let std = |sum: &BandSum| sum.std().map(|std| std * display.factor.abs());
+    HovmollerRow {
+        start: bin.start,
+        end: bin.end,
+        means: sums.iter().map(mean).collect(),
+        stds: sums.iter().filter(|_| with_stds).map(std).collect(),
+        coverage_percent: sums.iter().zip(areas_m2).map(coverage_percent).collect(),
+    }
 }
 
 fn band_deg(grid: &Grid, query: &HovmollerQuery) -> Result<f64, ContractError> {
@@ -165,13 +177,13 @@ async fn domain_areas(
     Ok(sums.iter().map(|sum| sum.area_m2).collect())
 }
 
-/// Sums of each bin and band, by area and seconds.
+/// Sums of each bin and band, by area and seconds, with squares where they are asked for.
 async fn sums_in(
     store: &Store,
     manifest: &Manifest,
     steps: &[&Step],
     bands: &Arc<Bands>,
-    bins: &[Period],
+    (bins, with_squares): (&[Period], bool),
 ) -> Result<Vec<Vec<BandSum>>, ComputeError> {
     let windows = bands.windows();
     let values = Values::of(store, &Arc::new(manifest.clone())).await?;
@@ -185,7 +197,14 @@ async fn sums_in(
             return Err(ComputeError::inconsistent(what, "it was not read"));
         };
         let (period, bands, windows) = (step.period, Arc::clone(bands), windows.clone());
-        let sums = tokio::task::spawn_blocking(move || bands.sums(&windows, &values)).await;
+        let sums = tokio::task::spawn_blocking(move || {
+            if with_squares {
+                bands.sums_with_squares(&windows, &values)
+            } else {
+                bands.sums(&windows, &values)
+            }
+        });
+        let sums = sums.await;
         let sums = sums.map_err(|e| ComputeError::inconsistent(step.field.to_string(), e))?;
         let from = bins.partition_point(|bin| bin.end <= period.start);
         let touched = bins.iter().zip(&mut all).skip(from);
@@ -193,8 +212,7 @@ async fn sums_in(
             let shared_ms = period.end.min(bin.end).ms() - period.start.max(bin.start).ms();
             let seconds = shared_ms as f64 / 1000.0;
             for (all, sum) in all.iter_mut().zip(&sums) {
-                all.weighted += sum.weighted * seconds;
-                all.area_m2 += sum.area_m2 * seconds;
+                all.add(sum, seconds);
             }
         }
     }

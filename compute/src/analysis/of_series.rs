@@ -23,7 +23,7 @@ pub fn analyse<'a>(
     options: &'a AnalysisOptions,
 ) -> BoxFuture<'a, Result<SeriesAnalysis, ComputeError>> {
     Box::pin(async move {
-        let read = read::series(engine, of, query).await?;
+        let read = read::series(engine, of, query, options.min_coverage).await?;
         let options = options.clone();
         // Pairs of thousands of steps take a moment.
         tokio::task::spawn_blocking(move || made_of(read, &options))
@@ -40,6 +40,7 @@ fn made_of(read: ReadSeries, options: &AnalysisOptions) -> SeriesAnalysis {
         place,
         periods,
         values,
+        left_out,
         notes,
     } = read;
     let mut answer = SeriesAnalysis {
@@ -47,6 +48,8 @@ fn made_of(read: ReadSeries, options: &AnalysisOptions) -> SeriesAnalysis {
         end: extent.end,
         step_count: periods.len() as u64,
         value_count,
+        min_coverage_percent: options.min_coverage.percent(),
+        left_out_count: left_out as u64,
         notes,
         refused: vec![],
         climatology: None,

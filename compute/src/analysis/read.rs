@@ -4,6 +4,8 @@ use contract::analysis::{SeriesPlace, SeriesQuery};
 use contract::cited::Cited;
 use contract::manifest::{Manifest, ManifestId};
 use contract::quantity::Quantity;
+use contract::series::RegionValue;
+use contract::statistics::MinCoverage;
 use contract::time::Period;
 
 use crate::point::point_series_of;
@@ -25,6 +27,8 @@ pub(crate) struct ReadSeries {
     pub(crate) periods: Vec<Period>,
     /// Beside them, in the unit that people read, NaN no data.
     pub(crate) values: Vec<f64>,
+    /// Steps that hold data over less of a region than asked for: they are NaN.
+    pub(crate) left_out: usize,
     pub(crate) notes: Vec<String>,
 }
 
@@ -42,13 +46,48 @@ impl ReadSeries {
         }
     }
 
+    /// Means over a region, without those over less of its sea than `least`.
+    fn take_means(&mut self, series: &[RegionValue], least: MinCoverage) {
+        let (all, mut little) = (series.len(), 0);
+        for step in series {
+            let (start, end) = (step.start, step.end);
+            let is_out = step.mean.is_some() && step.coverage_percent < least.percent();
+            let mean = step.mean.filter(|_mean| !is_out);
+            self.periods.push(Period { start, end });
+            self.values.push(mean.unwrap_or(f64::NAN));
+            self.left_out += usize::from(is_out);
+            little += usize::from(mean.is_some() && step.coverage_percent < LITTLE_PERCENT);
+        }
+        if self.left_out > 0 {
+            self.notes.push(format!(
+                "{} of {all} steps hold data over less than {} % of the region's sea and are left out",
+                self.left_out,
+                least.percent()
+            ));
+        }
+        if little > 0 {
+            self.notes.push(format!(
+                "{little} of {all} steps hold data over less than half of the region's sea; each counts as much as the others"
+            ));
+        }
+    }
+
+    /// Says of a cell how many steps hold data, where some do not.
+    fn tell_gaps(&mut self) {
+        let (all, held) = (self.values.len(), self.value_count());
+        if held < all {
+            self.notes
+                .push(format!("{held} of {all} steps hold data in this cell"));
+        }
+    }
+
     /// Steps with data.
     pub(crate) fn value_count(&self) -> usize {
         self.values.iter().filter(|value| !value.is_nan()).count()
     }
 }
 
-/// The series of a version of a product.
+/// The series of a version of a product, without steps that hold data over less of a region's sea than `least`.
 ///
 /// # Errors
 /// No step in the asked period, a place or region outside the grid, and what reading meets.
@@ -56,6 +95,7 @@ pub(crate) async fn series(
     engine: &Engine,
     (manifest, id): Version<'_>,
     query: &SeriesQuery,
+    least: MinCoverage,
 ) -> Result<ReadSeries, ComputeError> {
     let (from, to) = query.window();
     let (window, _inside) = manifest.steps_inside(from, to)?;
@@ -67,6 +107,7 @@ pub(crate) async fn series(
         },
         periods: vec![],
         values: vec![],
+        left_out: 0,
         notes: vec![],
     };
     match query {
@@ -81,25 +122,13 @@ pub(crate) async fn series(
                     read.values.push(step.value.unwrap_or(f64::NAN));
                 }
             }
+            read.tell_gaps();
         }
         SeriesQuery::Region(asked) => {
             let found = region_series_of(engine, asked, manifest).await?;
             read.place.region = Some(found.region);
             read.notes = found.notes;
-            let mut little = 0;
-            for step in &found.series {
-                let (start, end) = (step.start, step.end);
-                read.periods.push(Period { start, end });
-                read.values.push(step.mean.unwrap_or(f64::NAN));
-                little +=
-                    usize::from(step.mean.is_some() && step.coverage_percent < LITTLE_PERCENT);
-            }
-            if little > 0 {
-                let all = found.series.len();
-                read.notes.push(format!(
-                    "{little} of {all} steps hold data over less than half of the region's sea; each counts as much as the others"
-                ));
-            }
+            read.take_means(&found.series, least);
         }
     }
     if manifest.quantity == Quantity::AccumulatedCarbon {

@@ -4,6 +4,7 @@ use contract::ContractError;
 use contract::analysis::{
     CalendarBins, Correlation, CorrelationQuery, Difference, DifferenceSide, SeriesQuery,
 };
+use contract::statistics::MinCoverage;
 use contract::time::{Period, TimeStep};
 use futures::future::BoxFuture;
 
@@ -29,8 +30,9 @@ pub fn correlation<'a>(
 ) -> BoxFuture<'a, Result<Correlation, ComputeError>> {
     Box::pin(async move {
         let other = query.series.of_product(query.with.clone());
-        let a = read::series(engine, first, &query.series).await?;
-        let b = read::series(engine, second, &other).await?;
+        let all = MinCoverage::default();
+        let a = read::series(engine, first, &query.series, all).await?;
+        let b = read::series(engine, second, &other, all).await?;
         let (bins, mut values) = on_common_bins(&a, &b, query.step)?;
         if query.deseasonalise {
             let step_s = longest_s(&bins);
@@ -126,8 +128,9 @@ pub fn difference<'a>(
                 "both sides are the same: give another product, version or period to take off";
             return Err(ContractError::invalid("difference", &a_id.to_string(), reason).into());
         }
-        let a = read::series(engine, of.0, of.1).await?;
-        let b = read::series(engine, minus.0, minus.1).await?;
+        let all = MinCoverage::default();
+        let a = read::series(engine, of.0, of.1, all).await?;
+        let b = read::series(engine, minus.0, minus.1, all).await?;
         if a.cited.unit != b.cited.unit || a.cited.quantity != b.cited.quantity {
             let reason = format!(
                 "{} is in {}, {} in {}: they have no difference",

@@ -10,6 +10,7 @@ use contract::grid::{Grid, LonLatDeg};
 use contract::manifest::Manifest;
 use contract::quantity::Quantity;
 use contract::series::RegionSeriesQuery;
+use contract::statistics::MinCoverage;
 use contract::time::{Period, TimeStep};
 use storage::Store;
 
@@ -95,6 +96,47 @@ async fn a_region_and_a_cell_of_one_value_have_one_analysis_and_it_is_that_of_th
         "2010-12-01T00:00:00Z"
     );
     assert_eq!(point.place.cell.unwrap().row, 5);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn steps_that_cover_too_little_are_left_out_and_told_of() {
+    let (_folder, store) = folder_store();
+    // Of every third month a quarter of the cells, and far too high; of the first none.
+    let gaps = months(120, |month, cell| match (month, month % 3, cell % 4) {
+        (0, ..) | (_, 2, 1..) => f32::NAN,
+        (_, 2, _) => 1000.0,
+        _ => rising(month),
+    });
+    let manifest = wind(&store, "wind", &gaps).await;
+    let engine = Engine::in_process(store.clone(), parts(2));
+    let of = async |query: &SeriesQuery, percent: f64| {
+        let mut options = AnalysisOptions::new(vec![AnalysisPart::Extremes]).unwrap();
+        options.min_coverage = MinCoverage::new(percent).unwrap();
+        let id = manifest.id();
+        analyse(&engine, (&manifest, &id), query, &options)
+            .await
+            .unwrap()
+    };
+    let area = region("wind", "-140,-19,-120,-10");
+    let all = of(&area, 0.0).await;
+    let counts = |found: &contract::analysis::SeriesAnalysis| {
+        [found.step_count, found.value_count, found.left_out_count]
+    };
+    assert_eq!(counts(&all), [120, 119, 0]);
+    assert!(all.extremes.unwrap().highest[0].value > 100.0);
+    let full = of(&area, 50.0).await;
+    assert_eq!(counts(&full), [120, 79, 40]);
+    assert!((full.min_coverage_percent - 50.0).abs() < 1e-12);
+    assert!(full.extremes.unwrap().highest[0].value < 20.0);
+    assert_eq!(
+        full.notes,
+        ["40 of 120 steps hold data over less than 50 % of the region's sea and are left out"]
+    );
+    // A threshold below what is covered leaves nothing out.
+    assert_eq!(counts(&of(&area, 20.0).await), [120, 119, 0]);
+    let place = of(&cell("wind", -138.5, -10.5), 50.0).await;
+    assert_eq!(counts(&place), [120, 79, 0]);
+    assert_eq!(place.notes, ["79 of 120 steps hold data in this cell"]);
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -209,6 +251,55 @@ async fn periods_versions_and_products_are_compared() {
         assert_eq!(refused.class(), ErrorClass::BadRequest);
         assert!(refused.to_string().contains(reason), "{refused}");
     }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_profile_of_bands_has_their_mean_spread_and_coverage_over_the_whole_period() {
+    let (_folder, store) = folder_store();
+    // The western half of the second month is missing, and row 4 never has data.
+    let value = |month: u32, cell: usize| {
+        let (row, col) = (cell / 20, cell % 20);
+        if row == 4 || (month == 1 && col < 10) {
+            f32::NAN
+        } else {
+            (row * 10 + col % 2) as f32 + 100.0 * month as f32
+        }
+    };
+    let manifest = wind(&store, "wind", &months(3, value)).await;
+    let id = manifest.id();
+    let whole = HovmollerQuery {
+        product: product("wind"),
+        along: Along::Lat,
+        band_deg: None,
+        bounds_deg: None,
+        step: TimeStep::Total,
+        from: None,
+        to: None,
+        earth: Earth::Wgs84,
+    };
+    let found = analysis::hovmoller(&store, (&manifest, &id), &whole).await;
+    let found = found.unwrap();
+    assert_eq!((found.rows.len(), found.step), (1, TimeStep::Total));
+    let row = &found.rows[0];
+    assert_eq!((row.means[4], row.stds[4]), (None, None));
+    // Of the southernmost row, 80, by hand: days of a month, February by half of the cells; half of all cells are one higher.
+    let months = [(80.5, 31.0), (180.5, 28.0 / 2.0), (280.5, 31.0)];
+    let days: f64 = months.iter().map(|(_, days)| days).sum();
+    let mean = months.iter().map(|(own, days)| own * days).sum::<f64>() / days;
+    let squares = months
+        .iter()
+        .map(|(own, days)| ((own - mean).powi(2) + 0.25) * days);
+    let std = (squares.sum::<f64>() / days).sqrt();
+    assert!((row.means[0].unwrap() - mean).abs() < 1e-9, "{row:?}");
+    assert!((row.stds[0].unwrap() - std).abs() < 1e-9, "{row:?} {std}");
+    assert!((row.coverage_percent[0] - 100.0 * days / 90.0).abs() < 1e-9);
+    // No other step has spreads.
+    let monthly = HovmollerQuery {
+        step: TimeStep::Month,
+        ..whole
+    };
+    let found = analysis::hovmoller(&store, (&manifest, &id), &monthly).await;
+    assert!(found.unwrap().rows.iter().all(|row| row.stds.is_empty()));
 }
 
 #[tokio::test(flavor = "multi_thread")]

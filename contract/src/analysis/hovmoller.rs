@@ -83,7 +83,7 @@ pub struct Hovmoller {
     pub band_deg: f64,
     /// West, south, east, north of the cells whose middles count.
     pub bounds_deg: [f64; 4],
-    /// What a row covers; of months and years each step counts by the time that lies in it.
+    /// What a row covers (one row of all: the profile of bands); of months and years each step counts by the time that lies in it.
     pub step: TimeStep,
     /// Figure of the earth for areas.
     pub earth: Earth,
@@ -113,6 +113,10 @@ pub struct HovmollerRow {
     pub end: TimeMs,
     /// Mean of each band over its cells with data, by area; none without any.
     pub means: Vec<Option<f64>>,
+    /// Standard deviation of each band's values about its mean, by area and time, in the unit of the values; of the whole period
+    /// (`total`) alone.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub stds: Vec<Option<f64>>,
     /// Share of each band's area that holds data, percent.
     pub coverage_percent: Vec<f64>,
 }

@@ -13,6 +13,7 @@ use crate::manifest::Manifest;
 use crate::product::ProductId;
 use crate::region::{AskedRegion, Region};
 use crate::series::RegionSeriesQuery;
+use crate::statistics::MinCoverage;
 use crate::time::{TimeMs, TimeStep};
 
 /// Where a series is taken, and when.
@@ -56,7 +57,7 @@ impl SeriesWishes {
 }
 
 /// What is made of a series.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct AnalysisWishes {
     /// What, in any order.
     pub parts: Vec<AnalysisPart>,
@@ -66,6 +67,8 @@ pub struct AnalysisWishes {
     pub bins: Option<CalendarBins>,
     /// Means that a trend is drawn through.
     pub trend_step: Option<TimeStep>,
+    /// Least share of a region's sea that a step must hold data over.
+    pub min_coverage: Option<MinCoverage>,
 }
 
 impl AnalysisWishes {
@@ -78,6 +81,7 @@ impl AnalysisWishes {
             base: self.base,
             bins: self.bins.unwrap_or_default(),
             trend_step: self.trend_step.unwrap_or(AnalysisOptions::USUAL_STEP),
+            min_coverage: self.min_coverage.unwrap_or_default(),
             ..AnalysisOptions::new(self.parts)?
         })
     }

@@ -12,6 +12,7 @@ use contract::earth::Earth;
 use contract::grid::LonLatDeg;
 use contract::manifest::ManifestId;
 use contract::product::ProductId;
+use contract::statistics::MinCoverage;
 use contract::time::{TimeMs, TimeStep};
 
 use super::statistics::STEPS;
@@ -55,7 +56,10 @@ pub(crate) struct Analysis {
 
 impl Analysis {
     /// What is asked for; none if the series itself is.
-    pub(crate) fn asked(&self) -> Result<Option<AnalysisOptions>, ContractError> {
+    pub(crate) fn asked(
+        &self,
+        min_coverage: Option<MinCoverage>,
+    ) -> Result<Option<AnalysisOptions>, ContractError> {
         let asked = [
             (self.climatology, AnalysisPart::Climatology),
             (self.anomaly, AnalysisPart::Anomaly),
@@ -81,6 +85,7 @@ impl Analysis {
             base: self.base,
             bins: self.bins,
             trend_step: self.trend_step,
+            min_coverage,
         };
         wishes.options().map(Some)
     }

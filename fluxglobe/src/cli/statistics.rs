@@ -40,7 +40,8 @@ pub(crate) struct StatisticsOptions {
     /// What a row covers. Steps that lie in several rows count in each by their time there.
     #[arg(long, value_name = STEPS)]
     pub(crate) step: Option<TimeStep>,
-    /// Least coverage, percent: rows with less have no values and say so.
+    /// Least coverage, percent: rows with less have no values and say so; with --climatology, --trend and their like steps with less are
+    /// left out, and how many is said.
     #[arg(long, value_name = "PERCENT")]
     pub(crate) min_coverage: Option<MinCoverage>,
     /// Comma-separated values instead of a table.

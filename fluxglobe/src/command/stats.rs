@@ -46,10 +46,11 @@ async fn point(settings: &Settings, options: &StatsPoint) -> Result<()> {
         sampling: options.sampling,
         ..options.statistics.wishes()
     };
-    if let Some(analysed) = options.analysis.asked()? {
+    if let Some(analysed) = options.analysis.asked(options.statistics.min_coverage)? {
         let whole = StatisticsWishes {
             from: None,
             to: None,
+            min_coverage: None,
             ..wishes
         };
         let point = whole.at_point(options.product.clone(), place);
@@ -109,8 +110,15 @@ async fn polygon(settings: &Settings, options: &StatsPolygon) -> Result<()> {
         ..options.statistics.wishes()
     };
     let region = stored_region(settings, &store, &options.region).await?;
+    let analysed = options.analysis.asked(options.statistics.min_coverage)?;
+    // Of what is made of a series it says which steps count.
+    let min_coverage = wishes.min_coverage.filter(|_| analysed.is_none());
+    let wishes = StatisticsWishes {
+        min_coverage,
+        ..wishes
+    };
     let asked = wishes.over_region(options.product.clone(), region);
-    let query = match (options.analysis.asked()?, asked) {
+    let query = match (analysed, asked) {
         (Some(analysed), asked) => {
             let RegionQuestion::Series(query) = asked else {
                 return alone(false);
@@ -158,7 +166,7 @@ fn alone(is_a_series: bool) -> Result<()> {
     if !is_a_series {
         bail!(
             "--climatology, --anomaly, --trend, --season and --extremes are made of the means of all steps: leave \
-             --statistic, --step, --min-coverage, --sampling, --cells and --csv out"
+             --statistic, --step, --sampling, --cells and --csv out"
         );
     }
     Ok(())

@@ -6,6 +6,7 @@ mod hovmoller;
 mod lines;
 mod marked;
 mod page;
+mod profile;
 mod rows;
 mod time_axis;
 mod trend;
@@ -64,9 +65,12 @@ pub(crate) fn of_analysis(answer: &SeriesAnalysis) -> Result<String> {
     bail!("there is nothing to plot: {}", reasons.join("; "))
 }
 
-/// Latitude or longitude against time.
+/// Latitude or longitude against time; of the whole period in one row its profile.
 pub(crate) fn of_hovmoller(answer: &Hovmoller) -> Result<String> {
-    hovmoller::drawn(answer)
+    match answer.rows.as_slice() {
+        [row] if !row.stds.is_empty() => profile::drawn(answer, row),
+        _ => hovmoller::drawn(answer),
+    }
 }
 
 #[cfg(test)]

@@ -121,6 +121,23 @@ fn bands_against_time_have_the_colours_of_the_quantity_and_a_bar_of_them() {
 }
 
 #[test]
+fn the_whole_period_of_bands_is_a_profile_with_its_spread_broken_where_nothing_is() {
+    let band = |low: f64| json!({"low_deg": low, "high_deg": low + 30.0, "area_m2": 1e12});
+    let bands = [-60.0, -30.0, 0.0, 30.0].map(band);
+    let rows = [
+        json!({"start": month(0).0, "end": month(11).1, "means": [3.0, 4.0, null, 5.0], "stds": [1.0, 0.5, null, 2.0],
+        "coverage_percent": [100.0, 50.0, 0.0, 75.0]}),
+    ];
+    let made = json!({"along": "lat", "band_deg": 30.0, "bounds_deg": [-180.0, -60.0, 180.0, 60.0],
+        "step": "total", "earth": "wgs84", "bands": bands, "rows": rows});
+    let svg = of_hovmoller(&serde_json::from_value(cited(made)).unwrap()).unwrap();
+    is_told(&svg);
+    assert!(svg.contains("profile of latitude") && svg.contains("degrees north"));
+    assert_eq!(svg.matches("<polygon").count(), 2);
+    assert_eq!(svg.matches("<circle").count(), 3);
+}
+
+#[test]
 fn what_has_no_plot_says_so() {
     let made = json!({"highest": [], "lowest": [], "percentiles": []});
     let refused = of_analysis(&analysis("extremes", made)).unwrap_err();

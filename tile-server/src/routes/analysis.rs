@@ -31,6 +31,10 @@ pub(crate) struct AnalysisParameters {
     /// Means that the trend is drawn through; `month` unless told otherwise.
     #[param(value_type = Option<TimeStep>)]
     trend_step: Option<String>,
+    /// Least coverage, percent: steps that hold data over less of the region's sea are left out, and the answer says how many; 0
+    /// unless told otherwise.
+    #[param(value_type = Option<f64>, minimum = 0, maximum = 100)]
+    min_coverage: Option<String>,
     /// Longitude of a cell, degrees east, -180 to 360; with `lat`, in place of a region.
     #[param(value_type = Option<f64>)]
     lon: Option<String>,
@@ -79,6 +83,7 @@ pub(crate) async fn get(
         base: parsed(asked.base.as_deref())?,
         bins: parsed(asked.bins.as_deref())?,
         trend_step: parsed(asked.trend_step.as_deref())?,
+        min_coverage: parsed(asked.min_coverage.as_deref())?,
     };
     let options = wishes.options()?;
     let text = SeriesText {

@@ -16,7 +16,7 @@ fn last(app: &TestApp) -> SeriesQuestion {
 #[tokio::test]
 async fn every_parameter_of_an_analysis_reaches_the_analyst_once() {
     let app = TestApp::new().await;
-    let path = "/api/products/sst/analysis?lon=10&lat=20&parts=trend,anomaly&base=1991/2020&bins=season&trend_step=year&from=2000-02";
+    let path = "/api/products/sst/analysis?lon=10&lat=20&parts=trend,anomaly&base=1991/2020&bins=season&trend_step=year&min_coverage=40&from=2000-02";
     for _ in 0..2 {
         let body = app.get(path).await.json();
         assert_eq!(
@@ -38,19 +38,21 @@ async fn every_parameter_of_an_analysis_reaches_the_analyst_once() {
         (options.bins, options.trend_step),
         (CalendarBins::Season, TimeStep::Year)
     );
+    assert!((options.min_coverage.percent() - 40.0).abs() < 1e-12);
     assert_eq!(series.window(), ("2000-02".parse().ok(), None));
     assert!(matches!(series, SeriesQuery::Cell { place, .. } if place.lon > 9.9));
     for other in [
         "parts=season&region=global",
         "parts=season&region=14n-50n",
         "parts=trend&region=global",
+        "parts=trend&region=global&min_coverage=40",
     ] {
         app.get(&format!("/api/products/sst/analysis?{other}"))
             .await;
     }
     assert_eq!(
         app.analyst.made.lock().unwrap().len(),
-        4,
+        5,
         "two questions are taken for one"
     );
 }

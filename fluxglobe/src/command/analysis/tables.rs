@@ -3,14 +3,16 @@
 use comfy_table::presets::NOTHING;
 use comfy_table::{CellAlignment, Table};
 use contract::analysis::{
-    Anomalies, Climatology, Correlation, Difference, Extremes, Harmonic, Hovmoller, Season,
-    SeriesAnalysis, SeriesPlace, Trend,
+    Anomalies, Climatology, Correlation, Difference, Extremes, Harmonic, Hovmoller, HovmollerRow,
+    Season, SeriesAnalysis, SeriesPlace, Trend,
 };
 
 use crate::progress;
 
 /// Numbers of a row of bands that are shown on one line.
 const BANDS_SHOWN: usize = 12;
+/// Square metres in a million square kilometres.
+const M2_PER_MILLION_KM2: f64 = 1e12;
 
 /// Where a series is taken, for people.
 pub(super) fn place(place: &SeriesPlace) -> String {
@@ -231,8 +233,29 @@ pub(super) fn of_difference(answer: &Difference) -> String {
     table(&header, 4, rows.into_iter())
 }
 
-/// Every so manieth band, so that a row stays a line.
+/// A row a band of the whole period.
+fn of_profile(answer: &Hovmoller, row: &HovmollerRow) -> String {
+    let number = |value: Option<f64>| value.map_or_else(String::new, |value| format!("{value:.3}"));
+    let bands = answer.bands.iter().enumerate().map(|(at, band)| {
+        vec![
+            format!("{}..{}", band.low_deg, band.high_deg),
+            number(row.means[at]),
+            number(row.stds[at]),
+            format!("{:.1}", row.coverage_percent[at]),
+            format!("{:.3}", band.area_m2 / M2_PER_MILLION_KM2),
+        ]
+    });
+    let header = ["band, degrees", "mean", "std", "coverage, %", "10⁶ km²"];
+    table(&header, 1, bands)
+}
+
+/// Every so manieth band, so that a row stays a line; a row a band of the whole period.
 pub(super) fn of_hovmoller(answer: &Hovmoller) -> String {
+    if let [row] = answer.rows.as_slice()
+        && !row.stds.is_empty()
+    {
+        return of_profile(answer, row);
+    }
     let every = answer.bands.len().div_ceil(BANDS_SHOWN).max(1);
     let shown: Vec<usize> = (0..answer.bands.len()).step_by(every).collect();
     let mut header = vec!["from".to_owned()];
