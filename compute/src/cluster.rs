@@ -132,7 +132,9 @@ impl Cluster {
         runtime: Arc<RuntimeEnv>,
         partitions: NonZeroUsize,
     ) -> Result<SessionState, DataFusionError> {
-        let config = state::ballista_config(partitions);
+        // A client that is told how a job goes learns its name with the first news, at the end of its first stage, and could not
+        // cancel it before; one that asks, every 50 ms, knows it at once.
+        let config = state::ballista_config(partitions).set_bool("ballista.client.pull", true);
         let state = state::session_state(config, runtime, objects)?;
         let mut state = state.upgrade_for_ballista(self.scheduler.0.clone())?;
         // The upgrade to a Ballista session resets the functions to the built-in ones.
