@@ -66,7 +66,8 @@ async fn of_flux(
     let mut basis = None;
     if let Some(errors) = &query.errors {
         let flux = (manifest, steps);
-        let uncertain = uncertainty::of_rows(engine, query, errors, flux, &rows).await?;
+        let uncertain = uncertainty::of_rows(engine, query, errors, flux, &rows);
+        let uncertain = Box::pin(uncertain).await?;
         for (row, own) in rows.iter_mut().zip(uncertain.rows) {
             row.uncertainty = Some(own);
         }

@@ -64,3 +64,5 @@ mod told;
 mod troubled;
 #[cfg(test)]
 mod uncertainty;
+#[cfg(test)]
+mod windows;

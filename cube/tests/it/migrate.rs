@@ -146,7 +146,7 @@ async fn killed_anywhere_the_next_one_goes_on() {
         }
         brought_over(&store).await.unwrap();
         all_hold(&store, &versions).await;
-        answers += 9;
+        answers += 23;
     }
     assert!(answers > 60, "{answers}");
 }

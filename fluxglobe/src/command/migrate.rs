@@ -49,7 +49,7 @@ pub(crate) async fn run(settings: &Settings, options: &Migrate) -> Result<ExitCo
     let mut outcomes = vec![];
     for product in products {
         let told = |stage| tell(&bar, &product, stage);
-        let outcome = match migrate(&store, &product, &told).await {
+        let outcome = match Box::pin(migrate(&store, &product, &told)).await {
             Ok(migrated) => (Some(migrated), None),
             // It says nothing of this product alone.
             Err(CubeError::Storage(error)) if error.is_retryable() => return Err(error.into()),

@@ -72,23 +72,31 @@ pub(crate) async fn run(settings: &Settings, command: Command) -> Result<ExitCod
         }
         Command::Survey(options) => survey::run(&options).await?,
         Command::Verify(options) => return verify::run(settings, &options).await,
-        Command::Migrate(options) => return migrate::run(settings, &options).await,
+        Command::Migrate(options) => return Box::pin(migrate::run(settings, &options)).await,
         Command::Gc(options) => gc::run(settings, &options).await?,
-        Command::Bench(Bench::Stream(options)) => {
-            let log = deployment::needed_log(settings, &options.kafka).await?;
-            bench::stream::run(log.as_ref(), &options).await?;
-        }
-        Command::Bench(Bench::Render(options)) => bench::render::run(settings, options).await?,
-        Command::Bench(Bench::Budget(options)) => bench::budget::run(&options)?,
-        Command::Bench(Bench::Serve(options)) => bench::serve::run(&options).await?,
-        Command::Bench(Bench::Fly(options)) => bench::fly::run(&options).await?,
-        Command::Bench(Bench::Quality(options)) => bench::quality::run(settings, options).await?,
-        Command::Bench(Bench::Compare(options)) => bench::compare::run(&options)?,
-        Command::Bench(Bench::Landing(options)) => bench::landing::run(&options).await?,
-        Command::Bench(Bench::Fill(options)) => bench::fill::run(settings, &options)?,
+        Command::Bench(bench) => measure(settings, bench).await?,
         Command::Adapters(options) => adapters::run(settings, &options)?,
         Command::Generate(options) => generate::run(options)?,
         Command::DecodeFile { .. } => unreachable!("main runs the decoder before anything else"),
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Runs a bench.
+async fn measure(settings: &Settings, bench: Bench) -> Result<()> {
+    match bench {
+        Bench::Stream(options) => {
+            let log = deployment::needed_log(settings, &options.kafka).await?;
+            bench::stream::run(log.as_ref(), &options).await?;
+        }
+        Bench::Render(options) => bench::render::run(settings, options).await?,
+        Bench::Budget(options) => bench::budget::run(&options)?,
+        Bench::Serve(options) => bench::serve::run(&options).await?,
+        Bench::Fly(options) => bench::fly::run(&options).await?,
+        Bench::Quality(options) => bench::quality::run(settings, options).await?,
+        Bench::Compare(options) => bench::compare::run(&options)?,
+        Bench::Landing(options) => bench::landing::run(&options).await?,
+        Bench::Fill(options) => bench::fill::run(settings, &options)?,
+    }
+    Ok(())
 }
