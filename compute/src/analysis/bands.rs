@@ -42,7 +42,7 @@ impl BandSum {
     /// Adds the sum of a step that lasts so long, s; areas are of time too then. Sums are added in the order of time, so that they
     /// have the same bits each time.
     ///
-    /// Source: Chan, Golub and LeVeque (1983), doi:10.1080/00031305.1983.10483115.
+    /// Source: Chan, Golub and `LeVeque` (1983), doi:10.1080/00031305.1983.10483115.
     pub fn add(&mut self, step: &Self, seconds: f64) {
         let (own, more) = (self.area_m2, step.area_m2 * seconds);
         if own > 0.0 && more > 0.0 {
