@@ -133,9 +133,8 @@ fn dropped_queries(registry: &Registry) -> f64 {
     let family = families
         .iter()
         .find(|family| family.name() == "fluxglobe_scheduler_requests_total");
-    let all = family
-        .map(prometheus::proto::MetricFamily::get_metric)
-        .unwrap_or_default();
+    let all = family.map(prometheus::proto::MetricFamily::get_metric);
+    let all = all.unwrap_or_default();
     let is_dropped = |metric: &&prometheus::proto::Metric| {
         let mut labels = metric.get_label().iter();
         labels.any(|label| label.value() == "dropped")
