@@ -5,14 +5,14 @@ use std::sync::Arc;
 use compute::analysis::hovmoller;
 use compute::matchup::{TimeMatch, matchup};
 use compute::{Engine, budget};
-use contract::analysis::{Along, HovmollerQuery, MeanStep};
+use contract::analysis::{Along, HovmollerQuery};
 use contract::budget::{BudgetQuery, ErrorWords};
 use contract::earth::Earth;
 use contract::grid::Grid;
 use contract::manifest::Manifest;
 use contract::observation::{Observation, PlatformKind, Quality};
 use contract::quantity::Quantity;
-use contract::time::Period;
+use contract::time::{Period, TimeStep};
 use serde_json::Value;
 use storage::Store;
 use storage::store::Traffic;
@@ -85,7 +85,7 @@ async fn answers(store: &Store, manifest: &Manifest) -> (Vec<Value>, [u64; 2]) {
         along: Along::Lat,
         band_deg: None,
         bounds_deg: Some(BOX),
-        step: MeanStep::Month,
+        step: TimeStep::Month,
         from: None,
         to: None,
         earth: Earth::Wgs84,
