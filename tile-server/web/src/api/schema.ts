@@ -658,11 +658,6 @@ export interface components {
             /** @description How uncertain the budget is, if that was asked for. */
             uncertainty?: components["schemas"]["RowUncertainty"];
         };
-        /**
-         * @description What one row of a budget covers.
-         * @enum {string}
-         */
-        BudgetStep: "month" | "year" | "total";
         /** @description How the uncertainty of a budget was reckoned. */
         BudgetUncertainty: {
             /** @description What is assumed. */
@@ -871,7 +866,7 @@ export interface components {
             /** @description First instant that both cover. */
             start: components["schemas"]["TimeMs"];
             /** @description What they are compared in. */
-            step: components["schemas"]["MeanStep"];
+            step: components["schemas"]["TimeStep"];
             /**
              * Format: int32
              * @description The lag of the correlation that is furthest from none; none where no lag has any.
@@ -1031,8 +1026,8 @@ export interface components {
             earth: components["schemas"]["Earth"];
             /** @description One for each step in the order of time. */
             rows: components["schemas"]["HovmollerRow"][];
-            /** @description What a row covers; of months and years each step counts by the time that lies in it. */
-            step: components["schemas"]["MeanStep"];
+            /** @description What a row covers (one row of all: the profile of bands); of months and years each step counts by the time that lies in it. */
+            step: components["schemas"]["TimeStep"];
         };
         /** @description A band: cells whose middles lie in it, its lower edge included. */
         HovmollerBand: {
@@ -1062,6 +1057,11 @@ export interface components {
             means: (number | null)[];
             /** @description First instant that it covers. */
             start: components["schemas"]["TimeMs"];
+            /**
+             * @description Standard deviation of each band's values about its mean, by area and time, in the unit of the values; of the whole period
+             *     (`total`) alone.
+             */
+            stds?: (number | null)[];
         };
         /**
          * @description A line by least squares, its uncertainty with an effective number of values: n (1 - r) / (1 + r), r the correlation of
@@ -1242,11 +1242,6 @@ export interface components {
             /** @description Steps of files that landed before masked cells were counted. */
             uncounted_steps: number;
         };
-        /**
-         * @description Length of the means that values are gathered in first.
-         * @enum {string}
-         */
-        MeanStep: "native" | "month" | "year";
         /**
          * @description How a layer is drawn: a thematic map, particles as points, sprites or a volume with shadows, or trails of a flow.
          * @enum {string}
@@ -1757,7 +1752,17 @@ export interface components {
             end: components["schemas"]["TimeMs"];
             /** @description Highest, lowest, percentiles. */
             extremes?: components["schemas"]["Extremes"];
-            /** @description What may surprise: how the region was taken, steps that cover little of it. */
+            /**
+             * Format: int64
+             * @description Steps that hold data over less than that, and were left out.
+             */
+            left_out_count?: number;
+            /**
+             * Format: double
+             * @description Least share of a region's sea that a step had to hold data over, percent.
+             */
+            min_coverage_percent?: number;
+            /** @description What may surprise: how the region was taken, steps that cover little of it or were left out, steps without data. */
             notes: string[];
             /** @description What was asked for and cannot be said, and why. */
             refused: components["schemas"]["Refused"][];
@@ -1774,7 +1779,7 @@ export interface components {
             trend?: components["schemas"]["Trend"];
             /**
              * Format: int64
-             * @description Steps of them that hold data.
+             * @description Steps of them that hold data and were not left out.
              */
             value_count: number;
         };
@@ -1810,7 +1815,7 @@ export interface components {
             what: string;
         };
         /** @description Statistics of a product over a geometry, with all that is needed to cite them. */
-        StatisticsAnswer: {
+        StatisticsAnswer: components["schemas"]["Cited"] & {
             /** @description How cells on the coast counted. */
             cells: components["schemas"]["Cells"];
             /** @description What coverage is a share of. */
@@ -1821,8 +1826,6 @@ export interface components {
             geometry: string;
             /** @description `point`, `line` or `area`. */
             kind: string;
-            /** @description The version of the product that was read. */
-            manifest: string;
             /**
              * Format: double
              * @description Rows whose coverage is below this have no values, percent.
@@ -1832,10 +1835,6 @@ export interface components {
             notes: string[];
             /** @description What says which part of a cell is sea; none for points and lines. */
             ocean_source: string | null;
-            /** @description Product. */
-            product: components["schemas"]["ProductId"];
-            /** @description What the values are. */
-            quantity: components["schemas"]["Quantity"];
             /** @description Rows in the order of time, one for every bin of the period, also where it holds nothing. */
             rows: components["schemas"]["StatisticsRow"][];
             /**
@@ -1845,18 +1844,10 @@ export interface components {
             size: number;
             /** @description Unit of `size`: `m²`, `m` or `1`. */
             size_unit: string;
-            /** @description Citation of the product. */
-            source: string;
             /** @description Each statistic with its unit and what it means. */
             statistics: components["schemas"]["StatisticNote"][];
             /** @description What a row covers. */
-            step: components["schemas"]["StatisticsStep"];
-            /** @description Made up by a program rather than measured. */
-            synthetic: boolean;
-            /** @description Title of the product. */
-            title: string;
-            /** @description Unit of the product's values, the one that people read. */
-            unit: string;
+            step: components["schemas"]["TimeStep"];
         };
         /** @description Statistics of one bin of time. */
         StatisticsRow: {
@@ -1887,11 +1878,6 @@ export interface components {
                 [key: string]: number | null;
             };
         };
-        /**
-         * @description What one row of statistics covers.
-         * @enum {string}
-         */
-        StatisticsStep: "native" | "day" | "week" | "month" | "season" | "year" | "total";
         /** @description When a step holds. */
         StepTimes: {
             /** @description First instant after it. */
@@ -1976,6 +1962,11 @@ export interface components {
          */
         TimeMs: string;
         /**
+         * @description What one row of an answer covers: a budget's, a statistic's, a Hovmöller diagram's, a mean that a trend is drawn through.
+         * @enum {string}
+         */
+        TimeStep: "native" | "day" | "week" | "month" | "season" | "year" | "total";
+        /**
          * @description Trends of a series. Where steps are shorter than a year, the mean of each calendar month is taken off first, so that a
          *     season that begins or ends early is no trend.
          */
@@ -2001,7 +1992,7 @@ export interface components {
             /** @description Unit of every slope. */
             slope_unit: string;
             /** @description Means that it is drawn through; of months and years those that hold data over half of their time. */
-            step: components["schemas"]["MeanStep"];
+            step: components["schemas"]["TimeStep"];
             /** @description By the median of the slopes of all pairs. */
             theil_sen: components["schemas"]["TheilSenTrend"];
             /** @description What the lines are drawn through, seasons taken off about the mean where they are; steps without data are absent. */
@@ -2556,8 +2547,13 @@ export interface operations {
                 base?: string;
                 /** @description Parts of the year of the climatology: `month` (the default), `season` or `day`. */
                 bins?: string;
-                /** @description Means that the trend is drawn through: `month` (the default), `year` or `native`. */
-                trend_step?: string;
+                /** @description Means that the trend is drawn through; `month` unless told otherwise. */
+                trend_step?: components["schemas"]["TimeStep"];
+                /**
+                 * @description Least coverage, percent: steps that hold data over less of the region's sea are left out, and the answer says how many; 0
+                 *     unless told otherwise.
+                 */
+                min_coverage?: number;
                 /** @description Longitude of a cell, degrees east, -180 to 360; with `lat`, in place of a region. */
                 lon?: number;
                 /** @description Latitude of a cell, degrees north. */
@@ -2663,7 +2659,7 @@ export interface operations {
                  */
                 statistic?: string;
                 /** @description What a row of statistics covers; `native` unless told otherwise. */
-                step?: components["schemas"]["StatisticsStep"];
+                step?: components["schemas"]["TimeStep"];
                 /** @description Least coverage, percent: rows of statistics with less have no values; 0 unless told otherwise. */
                 min_coverage?: number;
                 /** @description How cells on the coast count in statistics; `whole` unless told otherwise. */
@@ -2686,11 +2682,9 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "application/json": {
+                    "application/json": (components["schemas"]["Cited"] & {
                         /** @description Figure of the earth for areas. */
                         earth: components["schemas"]["Earth"];
-                        /** @description The version of the product that was read. */
-                        manifest: string;
                         /** @description How the region was taken where that may surprise. */
                         notes: string[];
                         /**
@@ -2700,10 +2694,6 @@ export interface operations {
                         ocean_area_m2: number;
                         /** @description What says which part of a cell is sea. */
                         ocean_source: string;
-                        /** @description Product. */
-                        product: components["schemas"]["ProductId"];
-                        /** @description What the values are. */
-                        quantity: components["schemas"]["Quantity"];
                         /** @description The region by its name, or as `west,south,east,north`. */
                         region: string;
                         /**
@@ -2713,15 +2703,7 @@ export interface operations {
                         region_area_m2: number;
                         /** @description One mean for each step in the period, in the order of time. */
                         series: components["schemas"]["RegionValue"][];
-                        /** @description Citation of the product. */
-                        source: string;
-                        /** @description Made up by a program rather than measured. */
-                        synthetic: boolean;
-                        /** @description Title of the product. */
-                        title: string;
-                        /** @description Unit of the means, the one that people read. */
-                        unit: string;
-                    } | components["schemas"]["StatisticsAnswer"];
+                    }) | components["schemas"]["StatisticsAnswer"];
                 };
             };
             /** @description A parameter is not valid, or missing; the reason says what would be */
@@ -2788,7 +2770,7 @@ export interface operations {
                 /** @description First instant after the period; the product's own unless one is given. */
                 to?: string;
                 /** @description What a row covers; `total` unless told otherwise. */
-                step?: components["schemas"]["BudgetStep"];
+                step?: components["schemas"]["TimeStep"];
                 /** @description Figure of the earth for areas; `wgs84` unless one is given. */
                 earth?: components["schemas"]["Earth"];
                 /** @description How cells on the coast count; `whole` unless told otherwise. */
@@ -2910,7 +2892,7 @@ export interface operations {
                 /** @description First instant after the period; the product's own unless one is given. */
                 to?: string;
                 /** @description What a row covers; `total` unless told otherwise. */
-                step?: components["schemas"]["BudgetStep"];
+                step?: components["schemas"]["TimeStep"];
                 /** @description Figure of the earth for areas; `wgs84` unless one is given. */
                 earth?: components["schemas"]["Earth"];
                 /** @description How cells on the coast count; `whole` unless told otherwise. */
@@ -3026,8 +3008,8 @@ export interface operations {
                 with: string;
                 /** @description Most steps that one is moved against the other, 0 (the default) to 400. */
                 max_lag?: number;
-                /** @description What they are compared in: `month` (the default), `year` or `native`, for which both need the same periods. */
-                step?: string;
+                /** @description What they are compared in; `month` unless told otherwise. For `native` both need the same periods. */
+                step?: components["schemas"]["TimeStep"];
                 /** @description `true`: the mean of each calendar month is taken off both first. */
                 deseasonalise?: boolean;
                 /** @description Longitude of a cell, degrees east, -180 to 360; with `lat`, in place of a region. */
@@ -3214,8 +3196,8 @@ export interface operations {
                 along: components["schemas"]["Along"];
                 /** @description Height or width of a band, degrees; the least of 1, 2, 5, 10 that is no less than a cell unless given. */
                 band?: number;
-                /** @description What a row covers: `month` (the default), `year` or `native`. */
-                step?: string;
+                /** @description What a row covers; `month` unless told otherwise. `total` is the profile of the bands over all the period. */
+                step?: components["schemas"]["TimeStep"];
                 /**
                  * @description `global`, a named region that is a box, or `west,south,east,north` in degrees: cells whose middles lie in it; all of
                  *     the grid unless given.
@@ -3428,7 +3410,7 @@ export interface operations {
                  */
                 statistic?: string;
                 /** @description What a row covers; `native` unless told otherwise. */
-                step?: components["schemas"]["StatisticsStep"];
+                step?: components["schemas"]["TimeStep"];
                 /** @description First instant, ISO 8601 UTC; the product's own unless one is given. */
                 from?: string;
                 /** @description First instant after the period; the product's own unless one is given. */
@@ -3522,7 +3504,7 @@ export interface operations {
                  */
                 statistic?: string;
                 /** @description What a row of statistics covers; `native` unless told otherwise. */
-                step?: components["schemas"]["StatisticsStep"];
+                step?: components["schemas"]["TimeStep"];
                 /** @description Least coverage, percent: rows of statistics with less have no values; 0 unless told otherwise. */
                 min_coverage?: number;
                 /** @description First instant of statistics, ISO 8601 UTC; the product's own unless one is given. */
@@ -3549,7 +3531,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "application/json": {
+                    "application/json": (components["schemas"]["Cited"] & {
                         /** @description The cell that holds the place: the values are its mean, not those of the very place. */
                         cell: components["schemas"]["Cell"];
                         /**
@@ -3562,23 +3544,9 @@ export interface operations {
                          * @description Asked longitude, degrees, in [-180, 180).
                          */
                         lon_deg: number;
-                        /** @description The version of the product that was read. */
-                        manifest: string;
-                        /** @description Product. */
-                        product: components["schemas"]["ProductId"];
-                        /** @description What the values are. */
-                        quantity: components["schemas"]["Quantity"];
                         /** @description One value for each step, in the order of time. */
                         series: components["schemas"]["PointValue"][];
-                        /** @description Citation of the product. */
-                        source: string;
-                        /** @description Made up by a program rather than measured. */
-                        synthetic: boolean;
-                        /** @description Title of the product. */
-                        title: string;
-                        /** @description Unit of the values, the one that people read. */
-                        unit: string;
-                    } | components["schemas"]["StatisticsAnswer"];
+                    }) | components["schemas"]["StatisticsAnswer"];
                 };
             };
             /** @description A parameter is not valid, or missing; the reason says what would be */
@@ -4558,7 +4526,6 @@ export const alongValues: ReadonlyArray<FlattenedDeepRequired<components>["schem
 export const analysisPartValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["AnalysisPart"]> = ["climatology", "anomaly", "trend", "season", "extremes"];
 export const backgroundValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["Background"]> = ["none", "sky"];
 export const baseMapValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["BaseMap"]> = ["dark", "light"];
-export const budgetStepValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["BudgetStep"]> = ["month", "year", "total"];
 export const calendarBinsValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["CalendarBins"]> = ["month", "season", "day"];
 export const cellsValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["Cells"]> = ["whole", "ocean-share"];
 export const earthValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["Earth"]> = ["wgs84", "sphere", "local-radius"];
@@ -4569,7 +4536,6 @@ export const geometryOneOf1TypeValues: ReadonlyArray<Extract<FlattenedDeepRequir
     type: unknown;
 }>["type"]> = ["MultiLineString"];
 export const legendFormValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["LegendForm"]> = ["json", "svg", "png"];
-export const meanStepValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["MeanStep"]> = ["native", "month", "year"];
 export const modeValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["Mode"]> = ["map", "points", "sprites", "volume", "flow"];
 export const paletteValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["Palette"]> = ["balance", "curl", "delta", "thermal", "haline", "ice", "algae", "speed", "dense", "gray"];
 export const platformFeatureTypeValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["PlatformFeature"]["type"]> = ["Feature"];
@@ -4579,5 +4545,5 @@ export const qualityValues: ReadonlyArray<FlattenedDeepRequired<components>["sch
 export const quantityOneOf0Values: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["Quantity"]> = ["carbon_flux", "accumulated_carbon", "sea_surface_temperature", "sea_surface_skin_temperature", "sea_surface_subskin_temperature", "sea_surface_foundation_temperature", "chlorophyll", "wind_speed", "pco2", "fco2", "salinity", "air_pressure", "ice_fraction", "wave_height", "precipitation", "current", "elevation", "sea_area_fraction", "land_area_fraction"];
 export const samplingValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["Sampling"]> = ["cell", "bilinear"];
 export const scaleValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["Scale"]> = ["linear", "log"];
-export const statisticsStepValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["StatisticsStep"]> = ["native", "day", "week", "month", "season", "year", "total"];
+export const timeStepValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["TimeStep"]> = ["native", "day", "week", "month", "season", "year", "total"];
 export const verdictValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["Verdict"]> = ["within", "outside", "no_uncertainty_stated"];
