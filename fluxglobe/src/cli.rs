@@ -17,6 +17,7 @@ mod services;
 mod show;
 mod sql;
 mod statistics;
+mod steps;
 mod surroundings;
 mod upkeep;
 

@@ -64,9 +64,10 @@ fn all_kinds_of_clients_are_measured_on_a_real_server() {
         "send",
     ] {
         let stage = stage(&new, name).unwrap_or_else(|| panic!("{name}: {new}"));
-        // What was under way at the start or the end is in one of the two alone.
+        // What was under way at the start or the end is in one of the two alone, and what was answered while they were read.
+        let apart = 8 + answers / 50;
         assert!(
-            stage["times"].as_u64().unwrap() + 8 >= answers,
+            stage["times"].as_u64().unwrap() + apart >= answers,
             "{name}: {new}"
         );
     }

@@ -15,7 +15,7 @@ use contract::product::ProductId;
 use contract::statistics::MinCoverage;
 use contract::time::{TimeMs, TimeStep};
 
-use super::statistics::STEPS;
+use super::steps::STEPS;
 
 /// Heading of what is made of a series.
 const HEADING: &str = "Made of the series";

@@ -7,7 +7,7 @@ use contract::product::ProductId;
 use contract::region::Cells;
 use contract::time::{TimeMs, TimeStep};
 
-use super::statistics::STEPS;
+use super::steps::STEPS;
 
 /// Heading of what makes a budget uncertain.
 const UNCERTAINTY: &str = "Uncertainty";

@@ -9,9 +9,7 @@ use contract::statistics::{MinCoverage, Statistics, StatisticsWishes};
 use contract::time::{TimeMs, TimeStep};
 
 use super::analysis::{Analysis, PlotFile, StatsCorrelate, StatsDifference, StatsHovmoller};
-
-/// Steps of time that an answer may have.
-pub(crate) const STEPS: &str = "native|day|week|month|season|year|total";
+use super::steps::STEPS;
 
 /// `fluxglobe stats`.
 #[derive(Debug, Subcommand)]

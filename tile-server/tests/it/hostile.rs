@@ -114,8 +114,8 @@ const BAD_ADDRESSES: &[(&str, &str)] = &[
     ("/api/products/flux/budget?region=nan,0,1,1", "degrees"),
     ("/api/products/flux/budget?from=never", "ISO 8601"),
     (
-        "/api/products/flux/budget?step=week",
-        "month, year or total",
+        "/api/products/flux/budget?step=decade",
+        "month, season, year or total",
     ),
     ("/api/products/flux/budget?earth=flat", "local-radius"),
     ("/api/products/flux/budget?form=2000", "unknown field"),
