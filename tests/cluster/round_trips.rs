@@ -29,10 +29,15 @@ struct Asked {
     answered: Instant,
 }
 
+/// Is it more than a look whether something new has landed? Those go on beside all else, and nobody waits for them where servers are
+/// told of what lands.
+fn is_work(one: &Passed) -> bool {
+    !one.line.contains("list-type") && !one.line.starts_with("HEAD")
+}
+
 /// Waits until nobody reads or writes any more: sums of regions go on after all has landed. That is longer, too, than a list
 /// of products is taken for new.
 fn until_quiet(cluster: &Cluster) {
-    let is_work = |one: &Passed| !one.line.contains("list-type") && !one.line.starts_with("HEAD");
     let quiet = |cluster: &Cluster| {
         let passed = cluster.s3.passed();
         let last = passed
@@ -54,7 +59,7 @@ fn ask(cluster: &Cluster, tile: &str, time: &str) -> Asked {
     let during = |one: &Passed| one.begun >= begun && one.answered.is_some_and(|at| at <= answered);
     let passed = cluster.s3.passed().into_iter();
     Asked {
-        before: passed.filter(during).collect(),
+        before: passed.filter(during).filter(is_work).collect(),
         begun,
         answered,
     }
