@@ -5,7 +5,6 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use ballista::extension::SessionStateExt as _;
-use ballista_core::serde::protobuf::CancelJobParams;
 use ballista_core::serde::protobuf::scheduler_grpc_client::SchedulerGrpcClient;
 use ballista_core::utils::{GrpcClientConfig, create_grpc_client_endpoint};
 use datafusion::error::DataFusionError;
@@ -42,30 +41,13 @@ impl SchedulerUrl {
             .map_err(|e| ComputeError::cluster("reaching the scheduler")(e.into()))
     }
 
-    async fn connect(
-        &self,
-    ) -> Result<SchedulerGrpcClient<tonic::transport::Channel>, ComputeError> {
+    /// Does a scheduler answer there?
+    pub(crate) async fn answers(&self) -> Result<(), ComputeError> {
         let connected = self.endpoint()?.connect().await;
         let lost =
             |e: tonic::transport::Error| ComputeError::cluster("reaching the scheduler")(e.into());
-        Ok(SchedulerGrpcClient::new(connected.map_err(lost)?))
-    }
-
-    /// Does a scheduler answer there?
-    pub(crate) async fn answers(&self) -> Result<(), ComputeError> {
-        self.connect().await.map(drop)
-    }
-
-    /// Has the scheduler give out no more tasks of a job.
-    pub(crate) async fn cancel(&self, job: &str) -> Result<(), ComputeError> {
-        let job_id = job.to_owned();
-        let asked = self
-            .connect()
-            .await?
-            .cancel_job(CancelJobParams { job_id })
-            .await;
-        let failed = |e: tonic::Status| ComputeError::cluster("cancelling a query")(e.into());
-        asked.map(drop).map_err(failed)
+        drop(SchedulerGrpcClient::new(connected.map_err(lost)?));
+        Ok(())
     }
 }
 
@@ -132,9 +114,7 @@ impl Cluster {
         runtime: Arc<RuntimeEnv>,
         partitions: NonZeroUsize,
     ) -> Result<SessionState, DataFusionError> {
-        // A client that is told how a job goes learns its name with the first news, at the end of its first stage, and could not
-        // cancel it before; one that asks, every 50 ms, knows it at once.
-        let config = state::ballista_config(partitions).set_bool("ballista.client.pull", true);
+        let config = state::ballista_config(partitions);
         let state = state::session_state(config, runtime, objects)?;
         let mut state = state.upgrade_for_ballista(self.scheduler.0.clone())?;
         // The upgrade to a Ballista session resets the functions to the built-in ones.

@@ -10,7 +10,6 @@ pub mod budget;
 pub mod catalogue;
 pub mod check;
 pub mod cluster;
-mod cluster_job;
 pub mod computed;
 pub mod derive;
 mod error;

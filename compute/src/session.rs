@@ -9,15 +9,10 @@ use std::time::Duration;
 use ballista::extension::SessionConfigExt as _;
 use contract::digest::Digest;
 use contract::manifest::{Manifest, ManifestId};
-use datafusion::arrow::array::RecordBatch;
 use datafusion::catalog::MemoryCatalogProviderList;
 use datafusion::error::DataFusionError;
-use datafusion::execution::SendableRecordBatchStream;
 use datafusion::execution::context::SessionContext;
 use datafusion::execution::session_state::{SessionState, SessionStateBuilder};
-use datafusion::physical_plan::execute_stream;
-use datafusion::prelude::DataFrame;
-use futures::TryStreamExt as _;
 use futures::future::BoxFuture;
 use retry::Backoff;
 use storage::Store;
@@ -25,7 +20,6 @@ use tokio::sync::OnceCell;
 use tokio::time::Instant;
 
 use crate::cluster::{self, Cluster, SchedulerUrl};
-use crate::cluster_job::AwaitedJob;
 use crate::open_versions::OpenVersions;
 use crate::standalone::{self, WorkFolder, WorkLease};
 use crate::{ComputeError, Objects, state};
@@ -59,34 +53,8 @@ struct Session {
 /// A context for one query: the shared session, tables of its own, and a claim on intermediate files.
 pub(crate) struct QueryContext {
     context: SessionContext,
-    /// Whose job the query is; none of an engine in this process.
-    scheduler: Option<SchedulerUrl>,
     /// Dropped with the context: the files of a query outlive its last batch.
     _lease: Option<WorkLease>,
-}
-
-impl QueryContext {
-    /// Batches of a query as they come. A cluster's job is cancelled where they are dropped before their end.
-    pub(crate) async fn stream(
-        &self,
-        query: DataFrame,
-    ) -> Result<SendableRecordBatchStream, DataFusionError> {
-        let tasks = Arc::new(query.task_ctx());
-        let plan = query.create_physical_plan().await?;
-        let batches = execute_stream(Arc::clone(&plan), tasks)?;
-        Ok(match &self.scheduler {
-            None => batches,
-            Some(scheduler) => Box::pin(AwaitedJob::new(batches, plan, scheduler.clone())),
-        })
-    }
-
-    /// All batches of a query.
-    pub(crate) async fn collect(
-        &self,
-        query: DataFrame,
-    ) -> Result<Vec<RecordBatch>, DataFusionError> {
-        self.stream(query).await?.try_collect().await
-    }
 }
 
 impl std::ops::Deref for QueryContext {
@@ -352,13 +320,8 @@ impl Engine {
             Some(work) => Some(work.lease().await),
             None => None,
         };
-        let scheduler = match &self.inner.kind {
-            Kind::Cluster(cluster) => Some(cluster.scheduler.clone()),
-            Kind::Standalone | Kind::Local => None,
-        };
         Ok(QueryContext {
             context: SessionContext::new_with_state(state),
-            scheduler,
             _lease: lease,
         })
     }

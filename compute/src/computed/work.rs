@@ -37,7 +37,7 @@ where
         async move {
             let failed = || ComputeError::engine("computing a product");
             let query = query(&context, function, job, texts).map_err(failed())?;
-            let batches = context.collect(query).await.map_err(failed())?;
+            let batches = query.collect().await.map_err(failed())?;
             let mut made = vec![];
             for batch in &batches {
                 let answers = batch.column(0).as_string_opt::<i32>();

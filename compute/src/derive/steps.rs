@@ -132,7 +132,7 @@ async fn query(
     scan::register(context, "fields", store, &fields).await?;
     let sql = sql.replace("$start", &run[0].period.start.ms().to_string());
     let query = context.sql(&sql).await.map_err(failed())?;
-    context.stream(query).await.map_err(failed())
+    query.execute_stream().await.map_err(failed())
 }
 
 /// The window of an answered chunk, if it was asked for.

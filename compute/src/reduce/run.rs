@@ -101,7 +101,7 @@ fn sql(tasks: &[Task]) -> String {
 async fn ask(context: QueryContext, sql: &str) -> Result<Vec<RecordBatch>, ComputeError> {
     let failed = || ComputeError::engine("statistics");
     let query = context.sql(sql).await.map_err(failed())?;
-    context.collect(query).await.map_err(failed())
+    query.collect().await.map_err(failed())
 }
 
 /// The one row of an answer.

@@ -209,25 +209,6 @@ async fn a_cluster_that_never_answers_is_given_up_at_the_limit_with_the_reason()
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_query_that_nobody_waits_for_any_more_is_cancelled() {
-    let (folder, store) = wavy_store().await;
-    let mut cluster = Cluster::start(folder.path());
-    cluster.add(1, 500, 0);
-    let engine = engine(&store, &cluster);
-    let own = engine.clone();
-    let asking = tokio::spawn(async move { budget(&own, &monthly("global")).await });
-    cluster.busy(0);
-    assert!(!asking.is_finished(), "the query was over before the end");
-    asking.abort();
-    let (_, dropped, _) = cluster.scheduler.heard("DROPPED ", 0);
-    assert_eq!(dropped, "1");
-    // Who waits to the end has the answer, and nothing is cancelled.
-    let expected = ask(&Engine::local(store.clone()), &monthly("global")).await;
-    assert_eq!(ask(&engine, &monthly("global")).await, expected);
-    assert_eq!(cluster.scheduler.heard("DROPPED ", 0).1, "1");
-}
-
-#[tokio::test(flavor = "multi_thread")]
 async fn executors_and_scheduler_may_be_started_in_any_order_and_leave_in_peace() {
     let (folder, store) = wavy_store().await;
     let expected = ask(&Engine::local(store.clone()), &monthly("global")).await;

@@ -101,17 +101,12 @@ async fn run_scheduler(order: Order, registry: Registry, stop: Stop) {
         .unwrap();
     println!("READY {}", scheduler.address());
     tokio::spawn(async move {
-        let (mut shown, mut shown_dropped) = (String::new(), 0.0);
+        let mut shown = String::new();
         loop {
             let now = gauge(&registry, "fluxglobe_scheduler_executors");
             if now != shown {
                 println!("EXECUTORS {now}");
                 shown = now;
-            }
-            let dropped = dropped_queries(&registry);
-            if dropped > shown_dropped {
-                println!("DROPPED {dropped}");
-                shown_dropped = dropped;
             }
             tokio::time::sleep(Duration::from_millis(20)).await;
         }
@@ -125,24 +120,6 @@ fn gauge(registry: &Registry, name: &str) -> String {
     family.map_or_else(String::new, |family| {
         family.get_metric()[0].get_gauge().get_value().to_string()
     })
-}
-
-/// Queries that ended because nobody waited for them.
-fn dropped_queries(registry: &Registry) -> f64 {
-    let families = registry.gather();
-    let family = families
-        .iter()
-        .find(|family| family.name() == "fluxglobe_scheduler_requests_total");
-    let all = family.map(prometheus::proto::MetricFamily::get_metric);
-    let all = all.unwrap_or_default();
-    let is_dropped = |metric: &&prometheus::proto::Metric| {
-        let mut labels = metric.get_label().iter();
-        labels.any(|label| label.value() == "dropped")
-    };
-    all.iter()
-        .filter(is_dropped)
-        .map(|metric| metric.get_counter().get_value())
-        .sum()
 }
 
 async fn run_executor(order: Order, registry: Registry, stop: Stop) {
