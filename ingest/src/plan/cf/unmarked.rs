@@ -120,7 +120,9 @@ mod tests {
 
     fn ends(values: &[f64]) -> Ends {
         let mut ends = Ends::default();
-        values.iter().for_each(|value| ends.add(*value));
+        for value in values {
+            ends.add(*value);
+        }
         ends
     }
 
