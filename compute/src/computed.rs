@@ -24,7 +24,7 @@ use storage::{StorageError, domain, manifests};
 
 use crate::expression::unit::Unit;
 use crate::functions::{COMPUTED_EXTENT, COMPUTED_FIELD};
-use crate::{ComputeError, DeriveProgress, Engine, catalogue};
+use crate::{ComputeError, DeriveProgress, Engine, catalogue, held};
 use job::{ExtentMade, ExtentTask, FieldMade, FieldTask, Job};
 use make::Maker;
 use matched::{Input, Matched, Matches};
@@ -64,6 +64,7 @@ pub fn compute<'a>(
 ) -> BoxFuture<'a, Result<Outcome, ComputeError>> {
     Box::pin(async move {
         let plan = Plan::of(engine, request).await?;
+        held::check(&plan.job.target_grid, "a computed product")?;
         let latest = manifests::latest(engine.store(), &request.target).await?;
         if let Some(latest) = &latest {
             fits_what_is_there(latest, &plan.job)?;

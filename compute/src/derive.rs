@@ -18,7 +18,7 @@ use contract::time::{Period, TimeMs};
 use futures::future::BoxFuture;
 use storage::{StorageError, Store, manifests};
 
-use crate::{ComputeError, Engine, catalogue};
+use crate::{ComputeError, Engine, catalogue, held};
 pub(crate) use at_cell::counts_at_cell;
 use derivation::Derivation;
 use source::{SourceStep, steps_since};
@@ -96,6 +96,7 @@ async fn derive(
     prior: Option<&Manifest>,
     progress: &Progress<'_>,
 ) -> Result<Manifest, ComputeError> {
+    held::check(&source.grid, "accumulated carbon of every cell")?;
     let target = source.product.accumulated()?;
     let derivation = Derivation::begin(engine, source, &target, steps, prior).await?;
     commit(engine, source, derivation.finish(progress).await?).await

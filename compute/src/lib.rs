@@ -17,6 +17,7 @@ pub mod expression;
 mod failure;
 pub mod flight_sql;
 pub mod functions;
+mod held;
 pub mod gc;
 pub mod matchup;
 mod objects;

@@ -131,7 +131,7 @@ impl Objects {
             .get(address, async {
                 let content = self.content(address).await?;
                 let key = key_at(address)?;
-                let chunks = storage::weights::decode(&key, content)
+                let chunks = storage::weights::decode_shared(&key, content)
                     .map_err(|e| DataFusionError::External(e.into()))?;
                 Ok(RegionWeights::new(chunks))
             })

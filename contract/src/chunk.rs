@@ -1,11 +1,15 @@
 //! How a grid is cut into chunks: the rows of stored fields and the unit of every array kernel.
 
+use std::ops::Range;
+
 use crate::grid::Grid;
 
 /// Chunk rows of a field. 1-degree grids make 3 x 3 chunks, the 1/60-degree China Sea 41 x 15.
 pub const CHUNK_ROWS: u32 = 60;
 /// Chunk columns of a field.
 pub const CHUNK_COLS: u32 = 120;
+/// Cells of a band of a large field, which is what is held of it: 32 MiB of values, a quarter-degree map 8 times.
+pub const BAND_CELLS: u64 = 1 << 23;
 
 /// A rectangle of cells of a grid, row 0 north.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -57,9 +61,47 @@ pub fn field_chunks(grid: &Grid) -> Vec<Window> {
     windows(grid, CHUNK_ROWS, CHUNK_COLS)
 }
 
+/// How many chunks a field of `grid` has.
+pub fn field_chunk_count(grid: &Grid) -> u64 {
+    u64::from(grid.rows.div_ceil(CHUNK_ROWS)) * u64::from(grid.cols.div_ceil(CHUNK_COLS))
+}
+
+/// Bands of whole rows of chunks, north to south, that hold at most so many cells each, but for a band of one row of chunks: what
+/// large fields are read and written by.
+pub fn bands(grid: &Grid, most_cells: u64) -> impl Iterator<Item = Range<u32>> + use<> {
+    let (rows, chunk_row_cells) = (grid.rows, u64::from(CHUNK_ROWS) * u64::from(grid.cols));
+    let chunk_rows =
+        (most_cells / chunk_row_cells.max(1)).clamp(1, u64::from(u32::MAX / CHUNK_ROWS));
+    let band_rows = chunk_rows as u32 * CHUNK_ROWS;
+    let starts = (0..rows.div_ceil(band_rows)).map(move |band| band * band_rows);
+    starts.map(move |first| first..first.saturating_add(band_rows).min(rows))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn bands_are_whole_rows_of_chunks_and_at_least_one() {
+        let grid = |rows, cols| Grid {
+            rows,
+            cols,
+            north_deg: 90.0,
+            west_deg: -180.0,
+            dlat_deg: 180.0 / f64::from(rows),
+            dlon_deg: 360.0 / f64::from(cols),
+        };
+        let of = |grid: &Grid, cells| {
+            let edges = bands(grid, cells).map(|band| [band.start, band.end]);
+            edges.collect::<Vec<_>>()
+        };
+        assert_eq!(of(&grid(150, 100), 12_500), [[0, 120], [120, 150]]);
+        assert_eq!(of(&grid(150, 100), 1), [[0, 60], [60, 120], [120, 150]]);
+        assert_eq!(of(&grid(150, 100), u64::MAX), [[0, 150]]);
+        assert_eq!(of(&grid(1, 1), 1), [[0, 1]]);
+        let large = of(&grid(18_000, 36_000), 1 << 23);
+        assert_eq!((large.len(), large[1]), (100, [180, 360]));
+    }
 
     #[test]
     fn chunks_cover_every_cell_once() {
@@ -72,6 +114,7 @@ mod tests {
             dlon_deg: 0.1,
         };
         let mut seen = vec![0u8; grid.cell_count()];
+        assert_eq!(field_chunks(&grid).len() as u64, field_chunk_count(&grid));
         for window in field_chunks(&grid) {
             window.cell_indices(&grid).for_each(|i| seen[i] += 1);
         }

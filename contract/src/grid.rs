@@ -5,8 +5,9 @@ use serde::{Deserialize, Serialize};
 use crate::ContractError;
 use crate::earth::Earth;
 
-/// Most cells a stored grid may have: 2^28, a global 1/60-degree grid.
-pub const MAX_CELLS: u64 = 1 << 28;
+/// Most cells a stored grid may have: 2^31, three times a global grid of 1/100 degree. A cell's number fits 32 bits, and a map of
+/// float32 8 GiB.
+pub const MAX_CELLS: u64 = 1 << 31;
 
 /// A place: longitude in [-180, 180), latitude in [-90, 90], degrees.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -103,7 +104,7 @@ impl Grid {
             || self.cols == 0
             || u64::from(self.rows) * u64::from(self.cols) > MAX_CELLS
         {
-            return bad("it has no cells or more than 268435456");
+            return bad("it has no cells or more than 2147483648");
         }
         if numbers.iter().any(|v| !v.is_finite()) || self.dlat_deg <= 0.0 || self.dlon_deg <= 0.0 {
             return bad("steps must be positive and finite");

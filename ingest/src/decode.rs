@@ -1,8 +1,9 @@
-//! [`PlannedGranule`] in, one [`DecodedGrid`] a step out: values on the stored grid, in the stored unit.
+//! [`PlannedGranule`] in, the bands of each step out: values of some rows on the stored grid, in the stored unit.
+
+use std::ops::Range;
 
 use contract::masked::MaskedCells;
 use contract::quantity::Quantity;
-use contract::time::Period;
 
 use crate::error::Stop;
 use crate::inspect::file::description::Part;
@@ -10,26 +11,38 @@ use crate::inspect::reader::session::Session;
 use crate::plan::cf::axis::Mapping;
 use crate::plan::cf::coordinate::{Axis, Role};
 use crate::plan::cf::packing::Unpacked;
-use crate::plan::cf::unmarked;
+use crate::plan::cf::unmarked::Ends;
 use crate::plan::{PlannedGranule, PlannedStep};
 
-/// One step as values, `[row, col]`, row 0 north, stored unit, NaN for no data.
+/// Some rows of one step as values, `[row, col]`, from the north, stored unit, NaN for no data.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct DecodedGrid {
-    pub(crate) period: Period,
+pub(crate) struct DecodedBand {
     pub(crate) values: Vec<f32>,
     /// What the file gave a value for.
     pub(crate) masked: MaskedCells,
+    /// Of stored numbers, where one of them may mean no data though nothing says so.
+    pub(crate) ends: Ends,
 }
 
-/// Reads and turns one step.
+/// Rows of the file that hold some rows of the grid: the first, and how many. Rows follow each other in one direction or the other.
+fn file_rows(mapping: &Mapping, rows: &Range<u32>) -> (u64, u64) {
+    let rows = &mapping.file_rows[rows.start as usize..rows.end as usize];
+    let (first, last) = (rows.iter().min(), rows.iter().max());
+    let (first, last) = first.zip(last).expect("a band has rows");
+    (u64::from(*first), u64::from(last - first) + 1)
+}
+
+/// Reads and turns some rows of one step.
 pub(crate) async fn run(
     granule: &mut PlannedGranule,
     step: PlannedStep,
-) -> Result<DecodedGrid, Stop> {
-    let is_good = is_good(granule, step).await?;
+    rows: Range<u32>,
+) -> Result<DecodedBand, Stop> {
+    let (first, count) = file_rows(&granule.mapping, &rows);
+    let slab = Slab { step, first, count };
+    let is_good = is_good(granule, slab).await?;
     let (session, axes) = (&mut granule.session, &granule.axes);
-    let mut stored = plane(session, &granule.variable.name, axes, step).await?;
+    let mut stored = slab.read(session, &granule.variable.name, axes).await?;
     let mut masked = MaskedCells::default();
     let cells = stored.iter_mut().zip(is_good.iter().flatten());
     for (stored, _) in cells.filter(|(_, is_good)| !**is_good) {
@@ -37,29 +50,20 @@ pub(crate) async fn run(
         masked.poor_quality += u64::from(is_value);
         *stored = f64::NAN;
     }
+    let packing = &granule.packing;
+    let mut ends = Ends::default();
     if matches!(granule.target.quantity, Quantity::Open(_)) && granule.recipe.profile.is_none() {
-        let said = |stored: &f64| match granule.packing.unpacked(*stored) {
-            Unpacked::Value(_) => *stored,
-            Unpacked::Missing | Unpacked::OutOfRange => f64::NAN,
-        };
-        let said: Vec<f64> = stored.iter().map(said).collect();
-        unmarked::check(&granule.variable.name, &said)?;
+        let is_value = |stored: &&f64| matches!(packing.unpacked(**stored), Unpacked::Value(_));
+        stored.iter().filter(is_value).for_each(|v| ends.add(*v));
     }
-    let is_lat_first = granule.axes.iter().position(|a| a.role == Role::Latitude)
-        < granule.axes.iter().position(|a| a.role == Role::Longitude);
-    let len_of = |role| {
-        granule
-            .axes
-            .iter()
-            .find(|a| a.role == role)
-            .map_or(0, |a| a.len as usize)
-    };
+    let place = |role| granule.axes.iter().position(|a| a.role == role);
+    let len_of = |role| place(role).map_or(0, |at| granule.axes[at].len as usize);
+    let is_lat_first = place(Role::Latitude) < place(Role::Longitude);
     let strides = if is_lat_first {
         [len_of(Role::Longitude), 1]
     } else {
-        [1, len_of(Role::Latitude)]
+        [1, count as usize]
     };
-    let packing = &granule.packing;
     // One rounding to float32, at the end.
     let convert = |stored: f64| {
         let value = match packing.unpacked(stored) {
@@ -72,65 +76,78 @@ pub(crate) async fn run(
         };
         (value * step.factor + step.offset) as f32
     };
-    let values = turned(&granule.mapping, strides, &stored, convert);
-    Ok(DecodedGrid {
-        period: step.period,
+    let values = turned(&granule.mapping, rows, strides, &stored, convert);
+    Ok(DecodedBand {
         values,
         masked,
+        ends,
     })
 }
 
-/// One map of a variable as stored, in the order of the file.
-async fn plane(
-    session: &mut Session,
-    variable: &str,
-    axes: &[Axis],
+/// Some latitudes of one map, as they lie in the file.
+#[derive(Debug, Clone, Copy)]
+struct Slab {
     step: PlannedStep,
-) -> Result<Vec<f64>, Stop> {
-    let part: Vec<Part> = axes.iter().map(|axis| part(axis, step)).collect();
-    let expected = axes.iter().filter(|a| is_plane(a)).map(|a| a.len).product();
-    session.read(variable, &part, expected).await
+    first: u64,
+    count: u64,
 }
 
-/// Is every cell of the file's map good enough? None if nobody asks.
-async fn is_good(
-    granule: &mut PlannedGranule,
-    step: PlannedStep,
-) -> Result<Option<Vec<bool>>, Stop> {
+impl Slab {
+    /// Its values of a variable as stored, in the order of the file.
+    async fn read(
+        self,
+        session: &mut Session,
+        variable: &str,
+        axes: &[Axis],
+    ) -> Result<Vec<f64>, Stop> {
+        let part: Vec<Part> = axes.iter().map(|axis| self.part(axis)).collect();
+        let lens = axes.iter().map(|axis| match axis.role {
+            Role::Latitude => self.count,
+            Role::Longitude => axis.len,
+            Role::Time | Role::Other => 1,
+        });
+        session.read(variable, &part, lens.product()).await
+    }
+
+    fn part(self, axis: &Axis) -> Part {
+        let Self { first, count, .. } = self;
+        match axis.role {
+            Role::Latitude => Part::Some { first, count },
+            Role::Longitude => Part::All,
+            Role::Time => Part::At(self.step.time_index),
+            Role::Other => Part::At(0),
+        }
+    }
+}
+
+/// Is every cell of a part of the file's map good enough? None if nobody asks.
+async fn is_good(granule: &mut PlannedGranule, slab: Slab) -> Result<Option<Vec<bool>>, Stop> {
     let Some(quality) = &granule.quality else {
         return Ok(None);
     };
-    let stored = plane(&mut granule.session, &quality.variable, &quality.axes, step).await?;
+    let session = &mut granule.session;
+    let stored = slab.read(session, &quality.variable, &quality.axes).await?;
     Ok(Some(
         stored.into_iter().map(|n| quality.accepts(n)).collect(),
     ))
 }
 
-fn is_plane(axis: &Axis) -> bool {
-    matches!(axis.role, Role::Latitude | Role::Longitude)
-}
-
-fn part(axis: &Axis, step: PlannedStep) -> Part {
-    match axis.role {
-        Role::Latitude | Role::Longitude => Part::All,
-        Role::Time => Part::At(step.time_index),
-        Role::Other => Part::At(0),
-    }
-}
-
-/// Values in the order of the grid from a plane in the order of the file.
+/// Values in the order of the grid from a part of a map in the order of the file.
 ///
-/// - `strides`: distance in the file from one latitude, and from one longitude, to the next
+/// - `rows`: of the grid; `stored` begins with the first latitude of the file that one of them is
+/// - `strides`: distance in `stored` from one latitude, and from one longitude, to the next
 /// - result: `[row, col]` of `mapping.grid`
 fn turned(
     mapping: &Mapping,
+    rows: Range<u32>,
     strides: [usize; 2],
     stored: &[f64],
     mut convert: impl FnMut(f64) -> f32,
 ) -> Vec<f32> {
-    let mut values = Vec::with_capacity(mapping.grid.cell_count());
-    for row in &mapping.file_rows {
-        let start = *row as usize * strides[0];
+    let (first, _) = file_rows(mapping, &rows);
+    let mut values = Vec::with_capacity(rows.len() * mapping.file_cols.len());
+    for row in &mapping.file_rows[rows.start as usize..rows.end as usize] {
+        let start = (u64::from(*row) - first) as usize * strides[0];
         values.extend(
             mapping
                 .file_cols
@@ -155,8 +172,13 @@ mod tests {
             Mapping::from_labels(&lat, &lon, Registration::Center, ["lat", "lon"]).unwrap();
         let expected: Vec<f32> = vec![0.0, 1.0, 2.0, 3.0, 10.0, 11.0, 12.0, 13.0];
         let lat_first = [12.0, 13.0, 10.0, 11.0, 2.0, 3.0, 0.0, 1.0];
-        assert_eq!(turned(&mapping, [4, 1], &lat_first, |v| v as f32), expected);
+        let all = |strides, stored: &[f64]| turned(&mapping, 0..2, strides, stored, |v| v as f32);
+        assert_eq!(all([4, 1], &lat_first), expected);
         let lon_first = [12.0, 2.0, 13.0, 3.0, 10.0, 0.0, 11.0, 1.0];
-        assert_eq!(turned(&mapping, [1, 2], &lon_first, |v| v as f32), expected);
+        assert_eq!(all([1, 2], &lon_first), expected);
+        // The northern row alone is the second of the file.
+        assert_eq!(file_rows(&mapping, &(0..1)), (1, 1));
+        let north = turned(&mapping, 0..1, [4, 1], &lat_first[4..], |v| v as f32);
+        assert_eq!(north, expected[..4]);
     }
 }

@@ -1,37 +1,83 @@
-//! [`CheckedGrid`] in, [`EncodedGrid`] out: the bytes of a field and the key that the digest of its values gives it.
+//! [`CheckedBand`]s in, [`EncodedGrid`] out: the bytes of a field, written as its bands come, and the key that the digest of its
+//! values gives it.
 
-use bytes::Bytes;
+mod spool;
+
+use std::path::Path;
+
+use contract::chunk::CHUNK_ROWS;
 use contract::grid::Grid;
 use contract::key::ObjectKey;
 use contract::masked::MaskedCells;
 use contract::product::ProductId;
 use contract::time::Period;
+use storage::StorageError;
+use storage::content::Content;
+use storage::fields::Writer;
 
-use crate::check::CheckedGrid;
+use crate::check::CheckedBand;
 use crate::error::IngestError;
+use spool::Spool;
+
+pub(crate) use spool::HELD_BYTES;
 
 /// One step as the bytes of a field.
 #[derive(Debug, Clone)]
 pub(crate) struct EncodedGrid {
     pub(crate) period: Period,
     pub(crate) key: ObjectKey,
-    pub(crate) field: Bytes,
+    pub(crate) field: Content,
     pub(crate) valid_cells: u64,
     pub(crate) masked: MaskedCells,
 }
 
-pub(crate) fn run(
-    checked: &CheckedGrid,
-    product: &ProductId,
-    grid: &Grid,
-) -> Result<EncodedGrid, IngestError> {
-    let field = storage::fields::encode(grid, &checked.values, checked.period)
-        .map_err(IngestError::storage("encode a field"))?;
-    Ok(EncodedGrid {
-        period: checked.period,
-        key: ObjectKey::field(product, &field.values_sha256),
-        field: field.content,
-        valid_cells: checked.valid_cells,
-        masked: checked.masked,
-    })
+/// A field that is being written.
+pub(crate) struct Encoding {
+    grid: Grid,
+    spool: Spool,
+    field: Writer<Spool>,
+}
+
+impl Encoding {
+    /// A field whose first rows, so many, hold nothing. What is too large to be held goes to a file in `folder`.
+    pub(crate) fn begin(
+        folder: &Path,
+        grid: &Grid,
+        period: Period,
+        empty_rows: u32,
+    ) -> Result<Self, IngestError> {
+        let spool = Spool::new(folder);
+        let field = Writer::new(spool.clone(), grid, period).map_err(|e| failed(&spool, e))?;
+        let mut encoding = Self {
+            grid: *grid,
+            spool,
+            field,
+        };
+        let mut left = empty_rows;
+        while left > 0 {
+            let rows = left.min(CHUNK_ROWS);
+            let cells = rows as usize * encoding.grid.cols as usize;
+            encoding.band(&CheckedBand(vec![f32::NAN; cells]))?;
+            left -= rows;
+        }
+        Ok(encoding)
+    }
+
+    /// Writes the next rows.
+    pub(crate) fn band(&mut self, band: &CheckedBand) -> Result<(), IngestError> {
+        self.field.band(&band.0).map_err(|e| failed(&self.spool, e))
+    }
+
+    /// The key and the bytes of the field.
+    pub(crate) fn finish(self, product: &ProductId) -> Result<(ObjectKey, Content), IngestError> {
+        let Self { spool, field, .. } = self;
+        let (digest, _) = field.finish().map_err(|e| failed(&spool, e))?;
+        Ok((ObjectKey::field(product, &digest), spool.into_content()?))
+    }
+}
+
+/// A full disk is no fault of the field.
+fn failed(spool: &Spool, error: StorageError) -> IngestError {
+    let unwritten = spool.failure();
+    unwritten.unwrap_or_else(|| IngestError::storage("encode a field")(error))
 }

@@ -41,6 +41,8 @@ pub struct Settings {
     /// Memory that files which are worked on may take together, readers included, bytes: what they unpack to
     /// counts, not what they weigh. One that needs more goes alone.
     pub parallel_bytes: u64,
+    /// Folder for what is too large to be held while it is worked on.
+    pub spool: PathBuf,
     /// What may be read.
     pub sources: Sources,
     /// How files are to be read.
@@ -63,8 +65,19 @@ impl Settings {
             limits: Limits::default(),
             parallel_files: 2,
             parallel_bytes: 1 << 30,
+            spool: spool(),
             sources: Sources::command_line(),
             profiles: Profiles::shipped(),
         }
+    }
+}
+
+/// A folder on a disk: that for temporary files may lie in memory.
+fn spool() -> PathBuf {
+    let disk = PathBuf::from("/var/tmp");
+    if disk.is_dir() {
+        disk
+    } else {
+        std::env::temp_dir()
     }
 }

@@ -1,12 +1,94 @@
-//! The domain of a product: which cells hold data in some step, one byte a cell.
+//! The domain of a product: which cells hold data in some step. It is stored as one byte a cell; who makes one holds a bit a
+//! cell, and no more of its bytes than a piece.
+
+use std::ops::Range;
+use std::sync::Arc;
 
 use bytes::Bytes;
 use contract::digest::Digest;
 use contract::key::ObjectKey;
 use contract::product::ProductId;
+use futures::StreamExt as _;
+use object_store::ObjectStoreExt as _;
+use object_store::path::Path;
+use sha2::{Digest as _, Sha256};
 
+use crate::content::{Content, PIECE_BYTES};
+use crate::off_thread::off_thread;
 use crate::sound::damage;
+use crate::store::failed;
 use crate::{StorageError, Store};
+
+const WORD_BITS: usize = 64;
+const NO_BYTE: &str = "a byte is not 0 or 1";
+
+/// Some cells of a map, `[row, col]`, a bit each.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Cells {
+    words: Vec<u64>,
+    count: usize,
+}
+
+impl Cells {
+    /// None of so many cells.
+    pub fn none(count: usize) -> Self {
+        Self {
+            words: vec![0; count.div_ceil(WORD_BITS)],
+            count,
+        }
+    }
+
+    /// Cells of the map.
+    pub fn map_count(&self) -> usize {
+        self.count
+    }
+
+    /// Is there any?
+    pub fn is_any(&self) -> bool {
+        self.words.iter().any(|word| *word != 0)
+    }
+
+    /// Is it one of them?
+    ///
+    /// # Panics
+    /// The map has no such cell.
+    pub fn has(&self, cell: usize) -> bool {
+        self.words[cell / WORD_BITS] >> (cell % WORD_BITS) & 1 == 1
+    }
+
+    /// Adds those of the cells from `first` on that hold a value; NaN is none.
+    ///
+    /// # Panics
+    /// The map has not so many.
+    pub fn add_valued(&mut self, first: usize, values: &[f32]) {
+        for (cell, value) in (first..).zip(values) {
+            self.words[cell / WORD_BITS] |= u64::from(!value.is_nan()) << (cell % WORD_BITS);
+        }
+    }
+
+    /// Takes those of the cells from `first` on away that hold a value.
+    ///
+    /// # Panics
+    /// The map has not so many.
+    pub fn remove_valued(&mut self, first: usize, values: &[f32]) {
+        for (cell, value) in (first..).zip(values) {
+            self.words[cell / WORD_BITS] &= !(u64::from(!value.is_nan()) << (cell % WORD_BITS));
+        }
+    }
+
+    /// Takes others of the same map away.
+    pub fn remove(&mut self, others: &Self) {
+        for (word, other) in self.words.iter_mut().zip(&others.words) {
+            *word &= !other;
+        }
+    }
+
+    /// The bytes of some of them as they are stored.
+    fn bytes(&self, cells: Range<u64>) -> Bytes {
+        let cells = cells.start as usize..cells.end as usize;
+        cells.map(|cell| u8::from(self.has(cell))).collect()
+    }
+}
 
 /// Stores a domain (`[row, col]`) under the digest of its bytes.
 pub async fn write(
@@ -20,13 +102,63 @@ pub async fn write(
     Ok(key)
 }
 
+/// The same of cells that are held as bits.
+pub async fn write_cells(
+    store: &Store,
+    product: &ProductId,
+    cells: Cells,
+) -> Result<ObjectKey, StorageError> {
+    let cells = Arc::new(cells);
+    let size_bytes = cells.count as u64;
+    let own = Arc::clone(&cells);
+    let digest = off_thread(move || {
+        let mut hasher = Sha256::new();
+        for start in (0..size_bytes).step_by(PIECE_BYTES as usize) {
+            hasher.update(own.bytes(start..size_bytes.min(start + PIECE_BYTES)));
+        }
+        Ok(Digest::from_bytes(hasher.finalize().into()))
+    });
+    let key = ObjectKey::domain(product, &digest.await?);
+    let content = Content::Made(Arc::new(move |part| cells.bytes(part)), size_bytes);
+    store.put_new_content(&key, content).await?;
+    Ok(key)
+}
+
 /// Reads a domain, whose bytes must be those of its name.
 pub async fn read(store: &Store, key: &ObjectKey) -> Result<Vec<bool>, StorageError> {
     let content = store.get(key).await?;
     if content.iter().any(|&byte| byte > 1) {
-        return Err(damage::found(key, "a byte is not 0 or 1"));
+        return Err(damage::found(key, NO_BYTE));
     }
     Ok(content.iter().map(|&byte| byte == 1).collect())
+}
+
+/// The same as bits, read as it comes.
+pub async fn read_cells(store: &Store, key: &ObjectKey) -> Result<Cells, StorageError> {
+    let found = store.object_store().get(&Path::from(key.as_str())).await;
+    let found = found.map_err(|e| failed(key, e))?;
+    let mut cells = Cells::none(0);
+    let mut hasher = Sha256::new();
+    let mut pieces = found.into_stream();
+    while let Some(piece) = pieces.next().await {
+        let piece = piece.map_err(|e| failed(key, e))?;
+        if piece.iter().any(|&byte| byte > 1) {
+            return Err(damage::found(key, NO_BYTE));
+        }
+        hasher.update(&piece);
+        let first = cells.count;
+        cells.count += piece.len();
+        cells.words.resize(cells.count.div_ceil(WORD_BITS), 0);
+        for (cell, byte) in (first..).zip(&piece) {
+            cells.words[cell / WORD_BITS] |= u64::from(*byte) << (cell % WORD_BITS);
+        }
+    }
+    let digest = Digest::from_bytes(hasher.finalize().into());
+    if key.vouches() == contract::kind::Vouched::Bytes(digest) {
+        Ok(cells)
+    } else {
+        Err(damage::found(key, format!("its digest is {digest}")))
+    }
 }
 
 #[cfg(test)]
@@ -45,5 +177,35 @@ mod tests {
             .unwrap();
         let error = read(&store, &key).await.unwrap_err();
         assert!(error.to_string().contains(key.as_str()), "{error}");
+        let error = read_cells(&store, &key).await.unwrap_err();
+        assert!(error.to_string().contains(key.as_str()), "{error}");
+    }
+
+    #[tokio::test]
+    async fn bits_and_bytes_are_the_same_domain() {
+        let store = Store::memory();
+        let product = "p".parse().unwrap();
+        let some = |i: usize| i.is_multiple_of(3) || i.is_multiple_of(7);
+        let bytes: Vec<bool> = (0..1000).map(some).collect();
+        let value = |i: usize| if some(i) { 1.0 } else { f32::NAN };
+        let mut cells = Cells::none(1000);
+        for first in [0, 130, 500] {
+            let values: Vec<f32> = (first..1000).map(value).collect();
+            cells.add_valued(first, &values);
+        }
+        let key = write(&store, &product, &bytes).await.unwrap();
+        assert_eq!(
+            write_cells(&store, &product, cells.clone()).await.unwrap(),
+            key
+        );
+        assert_eq!(read_cells(&store, &key).await.unwrap(), cells);
+        assert_eq!((0..1000).map(|i| cells.has(i)).collect::<Vec<_>>(), bytes);
+        let mut rest = cells.clone();
+        rest.remove_valued(0, &(0..600).map(value).collect::<Vec<_>>());
+        assert!(!rest.has(0) && !rest.has(597) && rest.has(600) && rest.is_any());
+        cells.remove(&rest);
+        assert!(cells.has(597) && !cells.has(600));
+        rest.remove_valued(600, &[0.0; 400]);
+        assert!(!rest.is_any());
     }
 }

@@ -4,36 +4,40 @@
 //! before that was so are named by the digest of their bytes and have no check in their rows; they are read as they are.
 
 mod names;
+mod reader;
+mod writer;
 
 use std::sync::{Arc, LazyLock};
 
-use arrow::array::{
-    Float32Builder, ListBuilder, RecordBatch, TimestampMillisecondArray, UInt32Array,
-};
+use arrow::array::RecordBatch;
 use arrow::datatypes::{
     DataType, Field, Float32Type, Schema, SchemaRef, TimeUnit, TimestampMillisecondType, UInt32Type,
 };
 use bytes::Bytes;
-use contract::chunk::{Window, field_chunks};
+use contract::chunk::{BAND_CELLS, Window, field_chunk_count, field_chunks};
 use contract::digest::Digest;
-use contract::grid::Grid;
+use contract::grid::{Grid, MAX_CELLS};
 use contract::key::ObjectKey;
 use contract::kind::Vouched;
 use contract::product::ProductId;
 use contract::time::{Period, TimeMs};
 
 use crate::off_thread::off_thread;
-use crate::parquet_table::{self, Table, shape_only, value_field};
+use crate::parquet_table::{self, shape_only, value_field};
 use crate::row_check::RowCheck;
 use crate::rows::Expected;
 use crate::sound::{self, damage};
-use crate::values::{ValuesDigest, no_data_alike};
+use crate::values::ValuesDigest;
 use crate::{Encoded, StorageError, Store};
 
 pub use names::settle;
+pub use reader::{Bands, Reader};
+pub use writer::Writer;
 
 /// Chunks a reader takes at once: small enough to spread a large field over partitions.
 const CHUNKS_PER_GROUP: usize = 64;
+/// Fields of more cells are never held as an object and as values at once.
+const WHOLE_CELLS: u64 = 1 << 26;
 /// Column of the values.
 const VALUES: usize = 3;
 
@@ -67,55 +71,34 @@ pub fn expected(chunks: &[Window], chunk: u32, period: Period) -> Expected {
 
 /// A field of `values` (`[row, col]`, stored unit, NaN no data) as bytes.
 pub fn encode(grid: &Grid, values: &[f32], period: Period) -> Result<Encoded, StorageError> {
-    let batch = batch(grid, values, period)?;
+    if values.len() != grid.cell_count() {
+        let reason = format!("{} values for {} cells", values.len(), grid.cell_count());
+        return Err(StorageError::damaged("field to write", reason));
+    }
+    let mut field = Writer::new(vec![], grid, period)?;
+    for band in writer::in_bands(grid, values, BAND_CELLS) {
+        field.band(band)?;
+    }
+    let (values_sha256, content) = field.finish()?;
     Ok(Encoded {
-        values_sha256: digest_of(grid, values, period),
-        content: parquet_table::encode(&batch, CHUNKS_PER_GROUP, &[grid.rows, grid.cols])?,
+        values_sha256,
+        content: content.into(),
     })
 }
 
 /// What a field is: the shape of its grid, its period, its values row by row. Where the grid lies is not in it: axes of
 /// two files of one product may differ in their last digits.
 pub fn digest_of(grid: &Grid, values: &[f32], period: Period) -> Digest {
+    digest_begun(grid, period).values(values).finish()
+}
+
+/// The same before its values.
+fn digest_begun(grid: &Grid, period: Period) -> ValuesDigest {
     ValuesDigest::new("fluxglobe frame 2\n")
         .number(grid.rows.into())
         .number(grid.cols.into())
         .number(period.start.ms())
         .number(period.end.ms())
-        .values(values)
-        .finish()
-}
-
-fn batch(grid: &Grid, values: &[f32], period: Period) -> Result<RecordBatch, StorageError> {
-    if values.len() != grid.cell_count() {
-        let reason = format!("{} values for {} cells", values.len(), grid.cell_count());
-        return Err(StorageError::damaged("field to write", reason));
-    }
-    let windows = field_chunks(grid);
-    let mut lists = ListBuilder::new(Float32Builder::new()).with_field(value_field());
-    let mut checks = Vec::with_capacity(windows.len());
-    let mut chunk_values = vec![];
-    for (chunk, window) in windows.iter().enumerate() {
-        chunk_values.clear();
-        chunk_values.extend(window.cell_indices(grid).map(|i| no_data_alike(values[i])));
-        lists.values().append_slice(&chunk_values);
-        lists.append(true);
-        checks.push(check_of_row(chunk as u32, period, &chunk_values));
-    }
-    let time = |t: TimeMs| {
-        Arc::new(TimestampMillisecondArray::from(vec![t.ms(); windows.len()]).with_timezone("UTC"))
-    };
-    RecordBatch::try_new(
-        Arc::clone(&SCHEMA),
-        vec![
-            Arc::new(UInt32Array::from_iter_values(0..windows.len() as u32)),
-            time(period.start),
-            time(period.end),
-            Arc::new(lists.finish()),
-            Arc::new(UInt32Array::from(checks)),
-        ],
-    )
-    .map_err(|e| StorageError::damaged("field to write", e))
 }
 
 fn check_of_row(chunk: u32, period: Period, values: &[f32]) -> u32 {
@@ -127,71 +110,118 @@ fn check_of_row(chunk: u32, period: Period, values: &[f32]) -> u32 {
         .finish()
 }
 
-/// Values of a field, `[row, col]`, and its period.
+/// Why values are damaged that are others than their name says.
+const OTHER_VALUES: &str = "its values are not those of its name";
+
+fn other_grid(found: &Grid, wanted: &Grid) -> String {
+    format!(
+        "it is of {} x {} cells, its product of {} x {}",
+        found.rows, found.cols, wanted.rows, wanted.cols
+    )
+}
+
+/// The grid of a field, its values, `[row, col]`, and its period.
 fn decode(
     key: &ObjectKey,
     content: Bytes,
     grid: Option<&Grid>,
-) -> Result<(Vec<f32>, Period), StorageError> {
+) -> Result<(Grid, Vec<f32>, Period), StorageError> {
     let damaged = |reason: String| damage::found(key, reason);
     let name = match key.vouches() {
         Vouched::Values(name) => Some(name),
         Vouched::Bytes(_) | Vouched::Nothing => None,
     };
     let schema = if name.is_some() { &SCHEMA } else { &SCHEMA_1 };
-    let table = parquet_table::decode(key, content, schema)?;
+    let table = parquet_table::open(key, content)?;
     let stored = match (&table.shape[..], grid) {
         (&[rows, cols], _) => shape_only(rows, cols),
         (_, Some(grid)) => *grid,
         _ => return Err(damaged("it does not say how large its grid is".to_owned())),
     };
     if let Some(grid) = grid.filter(|grid| (grid.rows, grid.cols) != (stored.rows, stored.cols)) {
-        return Err(damaged(format!(
-            "it is of {} x {} cells, its product of {} x {}",
-            stored.rows, stored.cols, grid.rows, grid.cols
-        )));
+        return Err(damaged(other_grid(&stored, grid)));
     }
-    let (values, period) = values_of(&table, &stored).map_err(damaged)?;
+    // Before anything is allocated for a grid that the file made up.
+    check_count(&stored, table.row_count).map_err(damaged)?;
+    let mut whole = Whole::new(&stored);
+    for batch in table.batches {
+        let batch = batch.map_err(|e| damage::found(key, e))?;
+        if batch.schema().fields() != schema.fields() {
+            return Err(damaged("its columns are others".to_owned()));
+        }
+        whole.add(&batch).map_err(damaged)?;
+    }
+    let (values, period) = whole.finish().map_err(damaged)?;
     match name {
         Some(name) if digest_of(&stored, &values, period) != name => {
-            Err(damaged("its values are not those of its name".to_owned()))
+            Err(damaged(OTHER_VALUES.to_owned()))
         }
-        _ => Ok((values, period)),
+        _ => Ok((grid.copied().unwrap_or(stored), values, period)),
     }
 }
 
-fn values_of(table: &Table, grid: &Grid) -> Result<(Vec<f32>, Period), String> {
-    let batch = &table.batch;
-    let windows = field_chunks(grid);
-    if batch.num_rows() != windows.len() || windows.is_empty() {
-        return Err(format!(
-            "{} chunks, its grid has {}",
-            batch.num_rows(),
-            windows.len()
-        ));
-    }
-    let chunks = parquet_table::numbers::<UInt32Type>(batch, 0);
-    let time = |column| {
-        let times = parquet_table::numbers::<TimestampMillisecondType>(batch, column);
-        let first = times.value(0);
-        if times.values().iter().any(|time| *time != first) {
-            return Err("its chunks are of several periods".to_owned());
-        }
-        TimeMs::new(first).map_err(|e| e.to_string())
-    };
-    let period = Period::new(time(1)?, time(2)?).map_err(|e| e.to_string())?;
-    let mut values = vec![f32::NAN; grid.cell_count()];
-    for row in 0..batch.num_rows() {
-        let chunk = parquet_table::row_values::<Float32Type>(batch, VALUES, row);
-        let window = windows
-            .get(chunks.value(row) as usize)
-            .filter(|window| window.cell_count() == chunk.len())
-            .ok_or("a chunk does not fit its grid")?;
-        for (index, value) in window.cell_indices(grid).zip(chunk.values()) {
-            values[index] = *value;
+/// A field of which rows come.
+struct Whole<'a> {
+    grid: &'a Grid,
+    windows: Vec<Window>,
+    row_count: u64,
+    period: Option<Period>,
+    values: Vec<f32>,
+}
+
+impl<'a> Whole<'a> {
+    fn new(grid: &'a Grid) -> Self {
+        Self {
+            grid,
+            windows: field_chunks(grid),
+            row_count: 0,
+            period: None,
+            values: vec![f32::NAN; grid.cell_count()],
         }
     }
-    Ok((values, period))
+
+    fn add(&mut self, batch: &RecordBatch) -> Result<(), String> {
+        let chunks = parquet_table::numbers::<UInt32Type>(batch, 0);
+        let time = |column, row| {
+            let times = parquet_table::numbers::<TimestampMillisecondType>(batch, column);
+            TimeMs::new(times.value(row)).map_err(|e| e.to_string())
+        };
+        for row in 0..batch.num_rows() {
+            let period = Period::new(time(1, row)?, time(2, row)?).map_err(|e| e.to_string())?;
+            if *self.period.get_or_insert(period) != period {
+                return Err("its chunks are of several periods".to_owned());
+            }
+            let chunk = parquet_table::row_values::<Float32Type>(batch, VALUES, row);
+            let window = self
+                .windows
+                .get(chunks.value(row) as usize)
+                .filter(|window| window.cell_count() == chunk.len())
+                .ok_or("a chunk does not fit its grid")?;
+            for (index, value) in window.cell_indices(self.grid).zip(chunk.values()) {
+                self.values[index] = *value;
+            }
+        }
+        self.row_count += batch.num_rows() as u64;
+        Ok(())
+    }
+
+    fn finish(self) -> Result<(Vec<f32>, Period), String> {
+        check_count(self.grid, self.row_count)?;
+        let period = self.period.ok_or("it has no chunk")?;
+        Ok((self.values, period))
+    }
+}
+
+/// Has a field as many chunks as its grid, and no more than one may have?
+fn check_count(grid: &Grid, row_count: u64) -> Result<(), String> {
+    let (cells, chunks) = (
+        u64::from(grid.rows) * u64::from(grid.cols),
+        field_chunk_count(grid),
+    );
+    if row_count == chunks && (1..=MAX_CELLS).contains(&cells) {
+        return Ok(());
+    }
+    Err(format!("{row_count} chunks, its grid has {chunks}"))
 }
 
 /// Has a field that is named by its values these values?
@@ -209,7 +239,7 @@ pub async fn read(store: &Store, key: &ObjectKey, grid: &Grid) -> Result<Vec<f32
 /// The same of bytes that somebody else read from under its key.
 pub fn of_bytes(key: &ObjectKey, content: Bytes, grid: &Grid) -> Result<Vec<f32>, StorageError> {
     sound::of_bytes(key, &content)?;
-    decode(key, content, Some(grid)).map(|(values, _period)| values)
+    decode(key, content, Some(grid)).map(|(_grid, values, _period)| values)
 }
 
 async fn read_with_period(
@@ -217,9 +247,29 @@ async fn read_with_period(
     key: &ObjectKey,
     grid: &Grid,
 ) -> Result<(Vec<f32>, Period), StorageError> {
+    if grid.cell_count() as u64 > WHOLE_CELLS {
+        return read_by_bands(store, key, grid).await;
+    }
     let content = store.get(key).await?;
     let (key, grid) = (key.clone(), *grid);
-    off_thread(move || decode(&key, content, Some(&grid))).await
+    let decoded = off_thread(move || decode(&key, content, Some(&grid))).await;
+    decoded.map(|(_grid, values, period)| (values, period))
+}
+
+/// The same without holding the object beside the values.
+async fn read_by_bands(
+    store: &Store,
+    key: &ObjectKey,
+    grid: &Grid,
+) -> Result<(Vec<f32>, Period), StorageError> {
+    let reader = Reader::open(store, key, Some(grid)).await?;
+    let period = reader.period();
+    let mut bands = reader.bands();
+    let mut values = Vec::with_capacity(grid.cell_count());
+    while let Some((_rows, band)) = bands.next().await? {
+        values.extend_from_slice(&band);
+    }
+    Ok((values, period))
 }
 
 /// Stores a field under the digest of its values.

@@ -102,6 +102,11 @@ impl RowIndex {
         })
     }
 
+    /// What the file says of itself.
+    pub(crate) fn metadata(&self) -> &ParquetMetaData {
+        &self.meta
+    }
+
     /// Rows of the file.
     pub fn row_count(&self) -> u64 {
         self.starts.last().copied().unwrap_or_default()

@@ -7,6 +7,7 @@
 
 pub mod cube;
 pub mod damage;
+pub(crate) mod large;
 mod object;
 mod png;
 pub mod seal;
@@ -18,8 +19,10 @@ use contract::kind::{Kind, Vouched};
 use serde::Deserialize;
 
 use crate::StorageError;
+use crate::content::{Content, PIECE_BYTES};
 use crate::off_thread::off_thread;
-use seal::Seal;
+use seal::{PARQUET_END_BYTES, Seal, SealCheck};
+use sha2::{Digest as _, Sha256};
 
 pub use object::of_object;
 
@@ -37,6 +40,8 @@ const DOCUMENTS: [Kind; 8] = [
 
 /// Version of a document's schema from which it is sealed.
 const SEALED_SCHEMA: u32 = 2;
+const BROKEN: &str = "its bytes are not those that were sealed";
+const UNSEALED: &str = "its seal is gone";
 /// Content above this is hashed on a thread that may take its time.
 const SMALL_BYTES: usize = 1 << 20;
 
@@ -78,8 +83,8 @@ pub(crate) fn of_bytes(key: &ObjectKey, content: &[u8]) -> Result<Soundness, Sto
     };
     match seal {
         Seal::Whole => Ok(Soundness::Sound),
-        Seal::Broken => damaged("its bytes are not those that were sealed"),
-        Seal::Absent if must_be_sealed => damaged("its seal is gone"),
+        Seal::Broken => damaged(BROKEN),
+        Seal::Absent if must_be_sealed => damaged(UNSEALED),
         Seal::Absent => Ok(Soundness::Unsealed),
     }
 }
@@ -91,6 +96,74 @@ pub(crate) async fn of_large(key: &ObjectKey, content: &Bytes) -> Result<Soundne
     }
     let (key, content) = (key.clone(), content.clone());
     off_thread(move || of_bytes(&key, &content)).await
+}
+
+/// Bytes that come piece by piece, compared with a name or a seal.
+enum ByteCheck {
+    Name(Sha256, Digest),
+    Seal(SealCheck),
+}
+
+impl ByteCheck {
+    fn of_name(name: Digest) -> Self {
+        Self::Name(Sha256::new(), name)
+    }
+
+    fn of_seal(seal: SealCheck) -> Self {
+        Self::Seal(seal)
+    }
+
+    fn update(&mut self, piece: &[u8]) {
+        match self {
+            Self::Name(hasher, _) => hasher.update(piece),
+            Self::Seal(seal) => seal.update(piece),
+        }
+    }
+
+    fn finish(self, key: &ObjectKey) -> Result<(), StorageError> {
+        match self {
+            Self::Name(hasher, name) => {
+                let found = Digest::from_bytes(hasher.finalize().into());
+                if found == name {
+                    Ok(())
+                } else {
+                    Err(damage::found(key, format!("its digest is {found}")))
+                }
+            }
+            Self::Seal(seal) => match seal.finish() {
+                Seal::Whole => Ok(()),
+                Seal::Broken => Err(damage::found(key, BROKEN)),
+                Seal::Absent => Err(damage::found(key, UNSEALED)),
+            },
+        }
+    }
+}
+
+/// Is what is to be stored what its key says? Of a file its bytes are compared, and of a field in one its seal: its values were
+/// hashed as they were written.
+pub(crate) async fn of_content(key: &ObjectKey, content: &Content) -> Result<(), StorageError> {
+    let (key, content) = (key.clone(), content.clone());
+    off_thread(move || {
+        if let Content::Bytes(bytes) = &content {
+            return of_object(&key, bytes).map(|_soundness| ());
+        }
+        let unreadable = |e| damage::found(&key, format!("its file cannot be read: {e}"));
+        let mut check = match key.vouches() {
+            Vouched::Bytes(name) => ByteCheck::of_name(name),
+            Vouched::Values(_) => {
+                let size_bytes = content.size_bytes();
+                let end = size_bytes.saturating_sub(PARQUET_END_BYTES)..size_bytes;
+                let end = content.part(end).map_err(unreadable)?;
+                ByteCheck::of_seal(SealCheck::new(size_bytes, &end))
+            }
+            Vouched::Nothing => return Ok(()),
+        };
+        for piece in content.pieces(&key, PIECE_BYTES) {
+            check.update(&piece.map_err(unreadable)?);
+        }
+        check.finish(&key)
+    })
+    .await
 }
 
 /// Is a document of a version that is sealed sealed?
@@ -106,7 +179,7 @@ pub(crate) fn check_document(
     let version: Version =
         serde_json::from_slice(content).map_err(|e| damage::found(key, e.to_string()))?;
     if found == Soundness::Unsealed && version.schema.is_some_and(|it| it >= SEALED_SCHEMA) {
-        return Err(damage::found(key, "its seal is gone"));
+        return Err(damage::found(key, UNSEALED));
     }
     Ok(())
 }

@@ -45,8 +45,11 @@ pub use self::settings::{RetryLimits, Settings};
 pub use self::swap::Seen;
 pub use self::traffic::{Counts, Traffic};
 
-/// Largest object: a field of the largest grid is 1 GiB uncompressed.
-const MAX_OBJECT_BYTES: u64 = 2 << 30;
+/// Largest object that is held in memory: a field of 2^28 cells is 1 GiB uncompressed.
+pub(crate) const MAX_OBJECT_BYTES: u64 = 2 << 30;
+/// Largest object at all, which is stored from a file and read in parts: a field of the largest grid is 8 GiB uncompressed, and
+/// parts of 16 MiB are at most 10,000 to a bucket.
+const MAX_SPOOLED_BYTES: u64 = 16 << 30;
 /// Large objects are read and sent in parts of this size.
 const PART_BYTES: u64 = 16 << 20;
 /// Parts under way at a time.

@@ -17,6 +17,7 @@ pub struct Encoded {
 const AT_ONCE: usize = 1024;
 
 /// Hashes numbers as little-endian bytes, no-data as one bit pattern.
+#[derive(Debug)]
 pub(crate) struct ValuesDigest(Sha256);
 
 impl ValuesDigest {
@@ -35,6 +36,12 @@ impl ValuesDigest {
 
     /// Adds values.
     pub(crate) fn values(mut self, values: &[f32]) -> Self {
+        self.add(values);
+        self
+    }
+
+    /// Adds the next values of many.
+    pub(crate) fn add(&mut self, values: &[f32]) {
         let mut bytes = [0; 4 * AT_ONCE];
         for some in values.chunks(AT_ONCE) {
             for (to, value) in bytes.chunks_exact_mut(4).zip(some) {
@@ -42,7 +49,6 @@ impl ValuesDigest {
             }
             self.0.update(&bytes[..4 * some.len()]);
         }
-        self
     }
 
     /// The digest.

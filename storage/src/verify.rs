@@ -8,8 +8,8 @@ use contract::product::ProductId;
 use futures::{StreamExt as _, TryStreamExt as _, stream};
 use serde::Serialize;
 
-use crate::off_thread::off_thread;
-use crate::sound::{self, Soundness};
+use crate::sound::Soundness;
+use crate::sound::large;
 use crate::{StorageError, Store, manifests};
 
 /// Objects that are read at the same time.
@@ -134,8 +134,7 @@ pub async fn run(
 /// # Errors
 /// `Damaged` if it is not.
 pub async fn sound(store: &Store, key: &ObjectKey) -> Result<(), StorageError> {
-    let (own, content) = (key.clone(), store.fetch(key).await?);
-    off_thread(move || sound::of_object(&own, &content).map(|_soundness| ())).await
+    large::of_stored(store, key).await.map(|_soundness| ())
 }
 
 /// Those of these objects that are damaged, and may be made again.
@@ -172,15 +171,9 @@ async fn checked(store: Store, key: ObjectKey) -> Result<(ObjectKey, Checked), S
 }
 
 async fn check(store: &Store, key: &ObjectKey) -> Result<Checked, StorageError> {
-    let content = match store.fetch(key).await {
-        Ok(content) => content,
-        Err(e) if e.is_not_found() => return Ok(Checked::Gone),
-        Err(StorageError::Damaged { reason, .. }) => return Ok(Checked::Damaged(reason)),
-        Err(e) => return Err(e),
-    };
-    let (own, bytes) = (key.clone(), content.len() as u64);
-    match off_thread(move || sound::of_object(&own, &content)).await {
-        Ok(soundness) => Ok(Checked::Sound(soundness, bytes)),
+    match large::of_stored(store, key).await {
+        Ok((soundness, bytes)) => Ok(Checked::Sound(soundness, bytes)),
+        Err(e) if e.is_not_found() => Ok(Checked::Gone),
         Err(StorageError::Damaged { reason, .. }) => Ok(Checked::Damaged(reason)),
         Err(e) => Err(e),
     }

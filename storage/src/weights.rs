@@ -1,8 +1,9 @@
 //! Weights: the area of a region's share of every cell, a row a chunk, computed once and used for every step.
 
+use std::collections::VecDeque;
 use std::sync::{Arc, LazyLock};
 
-use arrow::array::{Float64Builder, ListBuilder, RecordBatch, UInt32Array};
+use arrow::array::{ArrayRef, Float64Builder, ListBuilder, RecordBatch, UInt32Array};
 use arrow::datatypes::{DataType, Field, Float64Type, Schema, SchemaRef, UInt32Type};
 use bytes::Bytes;
 use contract::key::ObjectKey;
@@ -29,37 +30,105 @@ fn area_field() -> Arc<Field> {
     Arc::new(Field::new("item", DataType::Float64, false))
 }
 
-/// Bytes of the weights of some chunks, in the order of their numbers.
-pub fn encode(chunks: &[(u32, Vec<f64>)]) -> Result<Bytes, StorageError> {
+/// Areas of the cells of a chunk that others may share: those of chunks side by side in the sea are the same.
+pub type SharedAreas = Arc<[f64]>;
+
+/// Areas that are held once, however many chunks have them.
+#[derive(Debug, Default)]
+pub struct Sharing {
+    /// The last ones that differ from each other.
+    last: VecDeque<SharedAreas>,
+    distinct_bytes: u64,
+}
+
+impl Sharing {
+    /// Areas that are compared with: along a row of chunks the sea's, and those of a few coasts.
+    const COMPARED: usize = 8;
+
+    /// The same areas, of which others have a part if they were there just before.
+    pub fn of(&mut self, areas_m2: &[f64]) -> SharedAreas {
+        let is_same = |own: &&SharedAreas| {
+            own.len() == areas_m2.len()
+                && own
+                    .iter()
+                    .zip(areas_m2)
+                    .all(|(a, b)| a.to_bits() == b.to_bits())
+        };
+        if let Some(own) = self.last.iter().rev().find(is_same) {
+            return Arc::clone(own);
+        }
+        let own: SharedAreas = areas_m2.into();
+        self.distinct_bytes += size_of_val(areas_m2) as u64;
+        if self.last.len() == Self::COMPARED {
+            self.last.pop_front();
+        }
+        self.last.push_back(Arc::clone(&own));
+        own
+    }
+
+    /// What the areas take that are held, bytes.
+    pub fn distinct_bytes(&self) -> u64 {
+        self.distinct_bytes
+    }
+}
+
+/// Bytes of the weights of some chunks, in the order of their numbers; they are the same however areas are held.
+pub fn encode<A: AsRef<[f64]>>(chunks: &[(u32, A)]) -> Result<Bytes, StorageError> {
+    let mut table =
+        parquet_table::Writer::new(vec![], &SCHEMA, CHUNKS_PER_GROUP, &[chunks.len() as u32])?;
+    for group in chunks.chunks(CHUNKS_PER_GROUP) {
+        table.write(&batch(group)?)?;
+    }
+    table.finish().map(Bytes::from)
+}
+
+fn batch<A: AsRef<[f64]>>(chunks: &[(u32, A)]) -> Result<RecordBatch, StorageError> {
     let mut lists = ListBuilder::new(Float64Builder::new()).with_field(area_field());
     for (_, areas) in chunks {
-        lists.values().append_slice(areas);
+        lists.values().append_slice(areas.as_ref());
         lists.append(true);
     }
     let numbers = chunks.iter().map(|(chunk, _)| *chunk);
-    let check = |(chunk, areas): &(u32, Vec<f64>)| RowCheck::new().u32(*chunk).f64s(areas).finish();
-    let batch = RecordBatch::try_new(
-        Arc::clone(&SCHEMA),
-        vec![
-            Arc::new(UInt32Array::from_iter_values(numbers)),
-            Arc::new(lists.finish()),
-            Arc::new(UInt32Array::from_iter_values(chunks.iter().map(check))),
-        ],
-    )
-    .map_err(|e| StorageError::damaged("weights to write", e))?;
-    parquet_table::encode(&batch, CHUNKS_PER_GROUP, &[chunks.len() as u32])
+    let check = |(chunk, areas): &(u32, A)| {
+        let check = RowCheck::new().u32(*chunk);
+        check.f64s(areas.as_ref()).finish()
+    };
+    let columns: Vec<ArrayRef> = vec![
+        Arc::new(UInt32Array::from_iter_values(numbers)),
+        Arc::new(lists.finish()),
+        Arc::new(UInt32Array::from_iter_values(chunks.iter().map(check))),
+    ];
+    RecordBatch::try_new(Arc::clone(&SCHEMA), columns)
+        .map_err(|e| StorageError::damaged("weights to write", e))
 }
 
 /// Weights by chunk, of bytes that were read from under a key; their seal must be whole.
 pub fn decode(key: &ObjectKey, content: Bytes) -> Result<Vec<(u32, Vec<f64>)>, StorageError> {
+    let chunks = decode_shared(key, content)?.into_iter();
+    Ok(chunks
+        .map(|(chunk, areas)| (chunk, areas.to_vec()))
+        .collect())
+}
+
+/// The same with equal areas held once.
+pub fn decode_shared(
+    key: &ObjectKey,
+    content: Bytes,
+) -> Result<Vec<(u32, SharedAreas)>, StorageError> {
     sealed(key, sound::of_bytes(key, &content)?)?;
-    let batch = parquet_table::decode(key, content, &SCHEMA)?.batch;
-    let numbers = parquet_table::numbers::<UInt32Type>(&batch, 0);
-    let row = |row| {
-        let areas = parquet_table::row_values::<Float64Type>(&batch, 1, row);
-        (numbers.value(row), areas.values().to_vec())
-    };
-    Ok((0..batch.num_rows()).map(row).collect())
+    let (mut sharing, mut chunks) = (Sharing::default(), vec![]);
+    for batch in parquet_table::open(key, content)?.batches {
+        let batch = batch.map_err(|e| damage::found(key, e))?;
+        if batch.schema().fields() != SCHEMA.fields() {
+            return Err(damage::found(key, "its columns are others"));
+        }
+        let numbers = parquet_table::numbers::<UInt32Type>(&batch, 0);
+        for row in 0..batch.num_rows() {
+            let areas = parquet_table::row_values::<Float64Type>(&batch, 1, row);
+            chunks.push((numbers.value(row), sharing.of(areas.values())));
+        }
+    }
+    Ok(chunks)
 }
 
 /// Reads stored weights.
@@ -84,19 +153,19 @@ fn sealed(key: &ObjectKey, soundness: Soundness) -> Result<(), StorageError> {
 }
 
 /// Stores weights under the key of the job they were computed for.
-pub async fn write(
+pub async fn write<A: AsRef<[f64]>>(
     store: &Store,
     key: &ObjectKey,
-    chunks: &[(u32, Vec<f64>)],
+    chunks: &[(u32, A)],
 ) -> Result<(), StorageError> {
     store.put_new(key, encode(chunks)?).await.map(|_new| ())
 }
 
 /// The same in the place of weights that were found damaged.
-pub async fn write_over(
+pub async fn write_over<A: AsRef<[f64]>>(
     store: &Store,
     key: &ObjectKey,
-    chunks: &[(u32, Vec<f64>)],
+    chunks: &[(u32, A)],
 ) -> Result<(), StorageError> {
     store.put_over(key, encode(chunks)?).await
 }
@@ -104,6 +173,25 @@ pub async fn write_over(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn equal_areas_are_held_once_and_read_as_what_they_are() {
+        let key = ObjectKey::weights(&contract::digest::Digest::of(b"job"));
+        let (sea, coast) = (vec![0.25; 7200], (0..7200).map(f64::from).collect::<Vec<_>>());
+        let chunk = |n: u32| (n, if n % 5 == 3 { coast.clone() } else { sea.clone() });
+        let chunks: Vec<_> = (0..200).map(chunk).collect();
+        let content = encode(&chunks).unwrap();
+        let shared = decode_shared(&key, content.clone()).unwrap();
+        assert_eq!(encode(&shared).unwrap(), content);
+        assert_eq!(decode(&key, content).unwrap(), chunks);
+        assert!(Arc::ptr_eq(&shared[0].1, &shared[199].1));
+        let mut sharing = Sharing::default();
+        chunks.iter().for_each(|(_, areas)| drop(sharing.of(areas)));
+        assert_eq!(sharing.distinct_bytes(), 2 * 8 * 7200);
+        // No zero is held for another one.
+        let zeros = [sharing.of(&[0.0]), sharing.of(&[-0.0])];
+        assert_ne!(zeros[0][0].to_bits(), zeros[1][0].to_bits());
+    }
 
     #[tokio::test]
     async fn weights_round_trip_bit_for_bit_and_damaged_ones_are_none() {

@@ -26,12 +26,9 @@ pub(crate) async fn touching(store: &Store, grid: &Grid) -> Result<Vec<Touching>
         let region: Region = named.name.parse()?;
         let (grid, weights) = (*grid, RegionKeys::new(grid, &region, EARTH));
         if !store.exists(&weights.all).await? {
-            let cover = move || weights::compute(&grid, &region, EARTH);
+            let cover = move || weights::covers(&grid, &region, EARTH);
             let covered = tokio::task::spawn_blocking(cover).await;
-            if covered
-                .map_err(|e| ComputeError::inconsistent("weights", e))??
-                .is_empty()
-            {
+            if !covered.map_err(|e| ComputeError::inconsistent("weights", e))?? {
                 continue;
             }
         }

@@ -7,11 +7,12 @@ use contract::geometry::{Geometry, Line, Sampling};
 use contract::grid::{Grid, LonLatDeg};
 use contract::region::{Polygon, Region};
 use serde::{Deserialize, Serialize};
+use storage::weights::SharedAreas;
 
 use super::cut::bounds_deg;
 use super::line_cover::lengths_m;
 use super::place_cover;
-use super::weights::{Surface, compute_of};
+use super::weights::{Surface, shared_of};
 use crate::ComputeError;
 
 /// What such a text begins with; addresses of stored weights do not.
@@ -77,18 +78,26 @@ impl ComputedWeights {
     pub(crate) fn chunks(
         &self,
         shares: Option<&[f32]>,
-    ) -> Result<Vec<(u32, Vec<f64>)>, ComputeError> {
+    ) -> Result<Vec<(u32, SharedAreas)>, ComputeError> {
         self.check_size()?;
         match &self.geometry {
             Geometry::Region(region) => {
-                compute_of(&self.grid, region, self.earth, &self.surface, shares)
+                shared_of(&self.grid, region, self.earth, &self.surface, shares)
             }
-            Geometry::Line(line) => lengths_m(&self.grid, line, self.earth),
+            Geometry::Line(line) => lengths_m(&self.grid, line, self.earth).map(shared),
             Geometry::Point { place, sampling } => {
-                Ok(place_cover::shares(&self.grid, *place, *sampling))
+                let shares = place_cover::shares(&self.grid, *place, *sampling);
+                Ok(shared(shares))
             }
         }
     }
+}
+
+fn shared(chunks: Vec<(u32, Vec<f64>)>) -> Vec<(u32, SharedAreas)> {
+    let chunks = chunks.into_iter();
+    chunks
+        .map(|(chunk, weights)| (chunk, weights.into()))
+        .collect()
 }
 
 /// The same as text: numbers by their bits, since readers of decimal numbers may differ in the last one, and weights that

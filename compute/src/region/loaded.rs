@@ -1,5 +1,6 @@
 //! A region's weights in memory, by chunk: read from the store once and shared by every task of a process.
 
+use std::collections::BTreeMap;
 use std::future::Future;
 use std::sync::Arc;
 
@@ -7,6 +8,7 @@ use datafusion::error::DataFusionError;
 use quick_cache::Weighter;
 use quick_cache::sync::Cache;
 use storage::StorageError;
+use storage::weights::SharedAreas;
 
 use crate::ComputeError;
 
@@ -20,11 +22,14 @@ const HELD_REGIONS: usize = 32;
 #[derive(Debug)]
 pub(crate) struct RegionWeights {
     /// In the order of their numbers; chunks that the region does not touch are left out.
-    chunks: Vec<(u32, Vec<f64>)>,
+    chunks: Vec<(u32, SharedAreas)>,
 }
 
 impl RegionWeights {
-    pub(crate) fn new(mut chunks: Vec<(u32, Vec<f64>)>) -> Self {
+    pub(crate) fn new<A: Into<SharedAreas>>(chunks: Vec<(u32, A)>) -> Self {
+        let chunks = chunks.into_iter();
+        let mut chunks: Vec<(u32, SharedAreas)> =
+            chunks.map(|(chunk, areas)| (chunk, areas.into())).collect();
         chunks.sort_by_key(|(chunk, _)| *chunk);
         Self { chunks }
     }
@@ -39,19 +44,25 @@ impl RegionWeights {
         let at = self
             .chunks
             .binary_search_by_key(&chunk, |(chunk, _)| *chunk);
-        at.ok().map(|at| self.chunks[at].1.as_slice())
+        at.ok().map(|at| &self.chunks[at].1[..])
     }
 
     /// Areas of the cells of every chunk that the region touches, with its number.
     pub(crate) fn chunks(&self) -> impl Iterator<Item = (u32, &[f64])> {
         self.chunks
             .iter()
-            .map(|(chunk, areas)| (*chunk, areas.as_slice()))
+            .map(|(chunk, areas)| (*chunk, &areas[..]))
     }
 
     fn size_bytes(&self) -> u64 {
-        let areas = self.chunks.iter().map(|(_, areas)| areas.len() as u64);
-        areas.sum::<u64>() * size_of::<f64>() as u64
+        // Those that several chunks share are held once.
+        let distinct: BTreeMap<*const f64, usize> = self
+            .chunks
+            .iter()
+            .map(|(_, areas)| (areas.as_ptr(), areas.len()))
+            .collect();
+        let areas = distinct.values().sum::<usize>() * size_of::<f64>();
+        (areas + self.chunks.len() * size_of::<(u32, SharedAreas)>()) as u64
     }
 }
 

@@ -6,7 +6,9 @@ use contract::key::ObjectKey;
 use contract::manifest::Manifest;
 use contract::quantity::Quantity;
 use serde::{Deserialize, Serialize};
+use storage::weights::SharedAreas;
 
+use super::weights::Found;
 use crate::ComputeError;
 
 /// How far two grids of the same cells may be apart, in cells: axes of files are rounded.
@@ -81,14 +83,17 @@ impl Shares {
     pub(super) fn weigh(
         &self,
         grid: &Grid,
-        mut chunks: Vec<(u32, Vec<f64>)>,
+        chunks: &[(u32, SharedAreas)],
         values: &[f32],
-    ) -> Result<Vec<(u32, Vec<f64>)>, ComputeError> {
+        found: &mut Found,
+    ) -> Result<Vec<(u32, SharedAreas)>, ComputeError> {
         let windows = field_chunks(grid);
         let mut unknown = 0u64;
-        for (chunk, areas_m2) in &mut chunks {
+        for (chunk, areas_m2) in chunks {
+            let mut areas_m2 = areas_m2.to_vec();
             let cells = windows[*chunk as usize].cell_indices(grid);
-            for (cell, area_m2) in cells.zip(areas_m2).filter(|(_, area_m2)| **area_m2 > 0.0) {
+            let areas = cells.zip(&mut areas_m2);
+            for (cell, area_m2) in areas.filter(|(_, area_m2)| **area_m2 > 0.0) {
                 let share = f64::from(values[cell]);
                 unknown += u64::from(share.is_nan());
                 *area_m2 *= match self.of {
@@ -96,6 +101,7 @@ impl Shares {
                     Of::Land => 1.0 - share,
                 };
             }
+            found.add(*chunk, &areas_m2)?;
         }
         if unknown > 0 {
             return Err(ComputeError::OceanShares {
@@ -105,7 +111,7 @@ impl Shares {
                 ),
             });
         }
-        Ok(chunks)
+        Ok(std::mem::take(&mut found.chunks))
     }
 }
 

@@ -7,6 +7,7 @@ use contract::grid::Grid;
 use contract::key::ObjectKey;
 use contract::region::Region;
 use serde::{Deserialize, Serialize};
+use storage::weights::{SharedAreas, Sharing};
 use storage::{StorageError, Store};
 
 use super::box_cover::{self, Bounds};
@@ -15,7 +16,7 @@ use super::ring::Ring;
 use super::rings::rings;
 use super::sea::sea;
 use super::shares::Shares;
-use crate::ComputeError;
+use crate::{ComputeError, held};
 
 /// Version of the way weights of boxes are computed: it changes when their bits do.
 const BOX_METHOD: u32 = 1;
@@ -126,6 +127,10 @@ struct Job<'a> {
     surface: Option<&'a Surface>,
 }
 
+/// Most memory that areas of one region may take, bytes, equal chunks counted once: what the coasts of a grid of 1/60 degree need
+/// several times.
+const MAX_AREA_BYTES: u64 = 2 << 30;
+
 /// Areas of a region's share of every cell, m², by chunk number; only chunks with any area.
 pub fn compute(
     grid: &Grid,
@@ -143,14 +148,30 @@ pub fn compute_of(
     surface: &Surface,
     shares: Option<&[f32]>,
 ) -> Result<Vec<(u32, Vec<f64>)>, ComputeError> {
+    let shared = shared_of(grid, region, earth, surface, shares)?.into_iter();
+    Ok(shared
+        .map(|(chunk, areas_m2)| (chunk, areas_m2.to_vec()))
+        .collect())
+}
+
+/// The same with equal chunks held once: of a box and of the open sea one a row of chunks.
+///
+/// # Errors
+/// `Region` if they take more than may be held.
+pub(crate) fn shared_of(
+    grid: &Grid,
+    region: &Region,
+    earth: Earth,
+    surface: &Surface,
+    shares: Option<&[f32]>,
+) -> Result<Vec<(u32, SharedAreas)>, ComputeError> {
     if let Surface::Shares(own) = surface {
         let values = shares.filter(|values| values.len() == grid.cell_count());
         let values = values.ok_or_else(|| {
             ComputeError::inconsistent(own.field.as_str(), "it was not read, or is of another grid")
         })?;
-        let mut chunks = own.weigh(grid, compute(grid, region, earth)?, values)?;
-        chunks.retain(any_area);
-        return Ok(chunks);
+        let all = shared_of(grid, region, earth, &Surface::All, None)?;
+        return own.weigh(grid, &all, values, &mut Found::default());
     }
     let bounds = match region {
         _ if *surface == Surface::Ocean => {
@@ -170,16 +191,43 @@ pub fn compute_of(
             north: *north,
         },
     };
-    let areas = |window| box_cover::areas_m2(bounds, grid, window, earth);
-    let windows = field_chunks(grid).into_iter().enumerate();
-    Ok(windows
-        .map(|(chunk, window)| (chunk as u32, areas(window)))
-        .filter(any_area)
-        .collect())
+    let mut found = Found::default();
+    for (chunk, window) in field_chunks(grid).into_iter().enumerate() {
+        let areas_m2 = box_cover::areas_m2(bounds, grid, window, earth);
+        found.add(chunk as u32, &areas_m2)?;
+    }
+    Ok(found.chunks)
 }
 
-fn any_area((_chunk, areas_m2): &(u32, Vec<f64>)) -> bool {
-    areas_m2.iter().any(|&area_m2| area_m2 > 0.0)
+/// Has a region any area on a grid?
+pub(crate) fn covers(grid: &Grid, region: &Region, earth: Earth) -> Result<bool, ComputeError> {
+    let shared = shared_of(grid, region, earth, &Surface::All, None)?;
+    Ok(!shared.is_empty())
+}
+
+/// Chunks with any area.
+#[derive(Default)]
+pub(super) struct Found {
+    sharing: Sharing,
+    pub(super) chunks: Vec<(u32, SharedAreas)>,
+}
+
+impl Found {
+    /// Adds a chunk, if it has any area.
+    pub(super) fn add(&mut self, chunk: u32, areas_m2: &[f64]) -> Result<(), ComputeError> {
+        if areas_m2.iter().any(|&area_m2| area_m2 > 0.0) {
+            self.chunks.push((chunk, self.sharing.of(areas_m2)));
+        }
+        if self.sharing.distinct_bytes() > MAX_AREA_BYTES {
+            let reason = format!(
+                "its weights on this grid take more than the {} MiB that are held: ask for a smaller region, or one with a simpler \
+                 edge",
+                MAX_AREA_BYTES >> 20
+            );
+            return Err(ComputeError::Region { reason });
+        }
+        Ok(())
+    }
 }
 
 /// Areas inside of rings.
@@ -187,8 +235,8 @@ fn ring_chunks(
     grid: &Grid,
     rings: &[Ring],
     earth: Earth,
-) -> Result<Vec<(u32, Vec<f64>)>, ComputeError> {
-    let mut chunks = vec![];
+) -> Result<Vec<(u32, SharedAreas)>, ComputeError> {
+    let mut found = Found::default();
     let mut band = None;
     for (chunk, window) in field_chunks(grid).into_iter().enumerate() {
         debug_assert_eq!(window.row % CHUNK_ROWS, 0, "chunks start at band rows");
@@ -196,11 +244,10 @@ fn ring_chunks(
             Some((row, current)) if row == window.row => current,
             _ => Band::new(rings, grid, window.row, earth)?,
         };
-        chunks.push((chunk as u32, current.window(window)));
+        found.add(chunk as u32, &current.window(window))?;
         band = Some((window.row, current));
     }
-    chunks.retain(any_area);
-    Ok(chunks)
+    Ok(found.chunks)
 }
 
 /// Where weights are stored, whether they are there or not.
@@ -255,12 +302,15 @@ pub async fn stored_of(
         }
         Err(e) => return Err(e.into()),
     };
+    if surface.shares().is_some() {
+        held::check(grid, "the share of the sea from a product")?;
+    }
     let values = match surface.shares() {
         Some(shares) => Some(storage::fields::read(store, &shares.field, grid).await?),
         None => None,
     };
     let (grid, region, own) = (*grid, region.clone(), surface.clone());
-    let cover = move || compute_of(&grid, &region, earth, &own, values.as_deref());
+    let cover = move || shared_of(&grid, &region, earth, &own, values.as_deref());
     let chunks = tokio::task::spawn_blocking(cover)
         .await
         .map_err(|e| ComputeError::inconsistent("weights", e))??;

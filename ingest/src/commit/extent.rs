@@ -7,7 +7,9 @@ use contract::key::ObjectKey;
 use contract::manifest::{Manifest, Step};
 use contract::product::ProductId;
 use futures::stream::{self, StreamExt as _, TryStreamExt as _};
-use storage::{StorageError, Store, domain, fields};
+use storage::domain::{self, Cells};
+use storage::fields::Reader;
+use storage::{StorageError, Store};
 
 use crate::error::IngestError;
 
@@ -27,19 +29,30 @@ pub(super) async fn write(
 ) -> Result<ObjectKey, IngestError> {
     let newest = newest.filter(|newest| newest.grid == *grid);
     let before = match newest {
-        Some(newest) => domain::read(store, &newest.domain)
+        Some(newest) => domain::read_cells(store, &newest.domain)
             .await
             .map_err(IngestError::storage("read the domain"))?,
-        None => vec![false; grid.cell_count()],
+        None => Cells::none(grid.cell_count()),
     };
+    if before.map_count() != grid.cell_count() {
+        let of_another = StorageError::Damaged {
+            object: newest.map_or_else(String::new, |newest| newest.domain.to_string()),
+            reason: format!(
+                "{} cells, its grid has {}",
+                before.map_count(),
+                grid.cell_count()
+            ),
+        };
+        return Err(IngestError::storage("read the domain")(of_another));
+    }
     let there = newest.map_or(&[][..], |newest| &newest.steps);
     let own = fields_of(there);
     let next = fields_of(steps);
     let mut cells = before.clone();
-    let mut lost = vec![false; cells.len()];
+    let mut lost = Cells::none(grid.cell_count());
     let gone = fields_but(there, &next);
-    let seen = each(store, grid, gone, |values| {
-        mark(&mut lost, values);
+    let seen = each(store, grid, gone, |first, values| {
+        lost.add_valued(first, values);
         true
     });
     match seen.await {
@@ -47,35 +60,32 @@ pub(super) async fn write(
         Err(IngestError::Storage {
             source: StorageError::Damaged { .. },
             ..
-        }) => lost.copy_from_slice(&before),
+        }) => lost.clone_from(&before),
         other => other?,
     }
     let come = fields_but(steps, &own);
-    each(store, grid, come, |values| {
-        mark(&mut cells, values);
-        find(&mut lost, values);
+    each(store, grid, come, |first, values| {
+        cells.add_valued(first, values);
+        lost.remove_valued(first, values);
         true
     })
     .await?;
-    if lost.contains(&true) {
+    if lost.is_any() {
         let mut kept: Vec<ObjectKey> = vec![];
         for step in steps.iter().rev().filter(|step| own.contains(&step.field)) {
             kept.push(step.field.clone());
         }
-        each(store, grid, kept, |values| {
-            find(&mut lost, values);
-            lost.contains(&true)
+        each(store, grid, kept, |first, values| {
+            lost.remove_valued(first, values);
+            lost.is_any()
         })
         .await?;
-        cells
-            .iter_mut()
-            .zip(&lost)
-            .for_each(|(cell, lost)| *cell &= !lost);
+        cells.remove(&lost);
     }
     match newest {
         // It was read just now: to store it again would be two requests for nothing.
         Some(newest) if cells == before => Ok(newest.domain.clone()),
-        _ => domain::write(store, product, &cells)
+        _ => domain::write_cells(store, product, cells)
             .await
             .map_err(IngestError::storage("store the domain")),
     }
@@ -102,38 +112,31 @@ fn fields_but(steps: &[Step], others: &BTreeSet<&ObjectKey>) -> Vec<ObjectKey> {
         .collect()
 }
 
-/// Hands the values of each field over, until `take` says that it needs no more.
+/// Hands the values of each field over, band by band with the number of the first cell, until `take` says that it needs no more.
 async fn each(
     store: &Store,
     grid: &Grid,
     keys: Vec<ObjectKey>,
-    mut take: impl FnMut(&[f32]) -> bool,
+    mut take: impl FnMut(usize, &[f32]) -> bool,
 ) -> Result<(), IngestError> {
-    let mut read = stream::iter(keys)
-        .map(|key| async move { fields::read(store, &key, grid).await })
+    let failed = || IngestError::storage("read a field");
+    // The first band of the next field is read while that of the one before is looked at.
+    let mut begun = stream::iter(keys)
+        .map(|key| async move {
+            let mut bands = Reader::open(store, &key, Some(grid)).await?.bands();
+            let first = bands.next().await?;
+            Ok::<_, StorageError>((bands, first))
+        })
         .buffered(FIELDS_AT_ONCE);
-    while let Some(values) = read
-        .try_next()
-        .await
-        .map_err(IngestError::storage("read a field"))?
-    {
-        if !take(&values) {
-            break;
+    while let Some((mut bands, mut band)) = begun.try_next().await.map_err(failed())? {
+        while let Some((rows, values)) = band {
+            if !take(rows.start as usize * grid.cols as usize, &values) {
+                return Ok(());
+            }
+            band = bands.next().await.map_err(failed())?;
         }
     }
     Ok(())
-}
-
-/// Cells that hold data are of the domain.
-fn mark(cells: &mut [bool], values: &[f32]) {
-    let cells = cells.iter_mut().zip(values);
-    cells.for_each(|(cell, value)| *cell |= !value.is_nan());
-}
-
-/// Cells that hold data are not lost.
-fn find(lost: &mut [bool], values: &[f32]) {
-    let lost = lost.iter_mut().zip(values);
-    lost.for_each(|(lost, value)| *lost &= value.is_nan());
 }
 
 #[cfg(test)]
@@ -142,6 +145,7 @@ mod tests {
     use contract::manifest::MANIFEST_SCHEMA;
     use contract::quantity::Quantity;
     use contract::time::Period;
+    use storage::fields;
 
     use super::*;
 

@@ -18,7 +18,11 @@ pub(crate) async fn mend(
 ) -> Result<Option<Manifest>, IngestError> {
     let mut next = newest.clone();
     let _memory = gates.memory(memory::of_fields(&newest.grid)).await;
-    if is_whole(domain::read(store, &newest.domain).await.map(|_cells| ()))? {
+    if is_whole(
+        domain::read_cells(store, &newest.domain)
+            .await
+            .map(|_cells| ()),
+    )? {
         return Ok(None);
     }
     next.domain = extent::write_again(store, newest).await?;

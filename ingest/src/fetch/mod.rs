@@ -24,7 +24,7 @@ pub(crate) use guard::Allowed;
 pub use guard::Sources;
 pub use http::AllowedHost;
 pub(crate) use location::Location;
-pub(crate) use raw::RawGranule;
+pub(crate) use raw::{HELD_BYTES, RawGranule};
 pub use retry::RetryLimits;
 pub(crate) use source_wait::SourceWait;
 pub(crate) use stored::RawFiles;

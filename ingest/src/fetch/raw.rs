@@ -8,9 +8,13 @@ use std::time::SystemTime;
 
 use bytes::Bytes;
 use contract::digest::Digest;
+use storage::content::Content;
 
 use super::spool::Spooled;
 use crate::error::IngestError;
+
+/// Files up to this size are held while they are stored, bytes.
+pub(crate) const HELD_BYTES: u64 = 64 << 20;
 
 /// A file whose digest is known.
 #[derive(Debug, Clone)]
@@ -79,8 +83,21 @@ impl RawGranule {
         }
     }
 
-    /// The whole content, which is still the one of the digest.
-    pub(crate) async fn content(&self) -> Result<Bytes, IngestError> {
+    /// The whole content. Of a small file it is read, and still the one of the digest; a larger one is compared with that as it
+    /// is stored.
+    pub(crate) async fn content(&self) -> Result<Content, IngestError> {
+        if self.size_bytes > HELD_BYTES {
+            let file = self.file().try_clone();
+            let file = file.map_err(|_gone| IngestError::Changed {
+                file: self.path.clone(),
+            })?;
+            return Ok(Content::File(Arc::new(file), self.size_bytes));
+        }
+        self.bytes().await.map(Content::Bytes)
+    }
+
+    /// All of it in memory, which is still the one of the digest.
+    pub(crate) async fn bytes(&self) -> Result<Bytes, IngestError> {
         let own = self.clone();
         tokio::task::spawn_blocking(move || own.read()).await?
     }

@@ -54,9 +54,9 @@ pub struct ServiceSettings {
     #[arg(long, env = "FLUXGLOBE_SPOOL_BYTES", default_value_t = 16 << 30,
           value_parser = clap::value_parser!(u64).range(MIB..=TIB))]
     pub spool_bytes: u64,
-    /// Largest file, bytes; larger ones are refused. 1 MiB to 2 GiB, which is what the store takes in one object.
-    #[arg(long, env = "FLUXGLOBE_FILE_BYTES", default_value_t = 2 << 30,
-          value_parser = clap::value_parser!(u64).range(MIB..=2 << 30))]
+    /// Largest file, bytes; larger ones are refused. 1 MiB to 16 GiB, which is what the store takes in one object.
+    #[arg(long, env = "FLUXGLOBE_FILE_BYTES", default_value_t = 8 << 30,
+          value_parser = clap::value_parser!(u64).range(MIB..=16 << 30))]
     pub file_bytes: u64,
     /// Files that are read at the same time, 1 to 64: each has a reader process of its own.
     #[arg(long, env = "FLUXGLOBE_PARALLEL_FILES", default_value_t = 2,
@@ -137,6 +137,7 @@ impl ServiceSettings {
             },
             parallel_files: usize::from(self.parallel_files),
             parallel_bytes: self.parallel_bytes,
+            spool: self.spool.clone(),
             profiles: match &self.profiles {
                 Some(folder) => Profiles::with_folder(folder)?,
                 None => Profiles::shipped(),

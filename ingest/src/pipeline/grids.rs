@@ -1,9 +1,11 @@
-//! [`PlannedGranule`] in, its [`Reading`] out: steps are decoded one after the other, and checked, encoded and put a few at a
-//! time.
+//! [`PlannedGranule`] in, its [`Reading`] out: steps are decoded one after the other, band by band, and checked, encoded and put
+//! a few at a time.
 
-use std::path::Path;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
 use std::pin::pin;
 
+use contract::chunk::bands;
 use contract::event::RejectReason;
 use contract::grid::Grid;
 use contract::key::ObjectKey;
@@ -13,17 +15,20 @@ use contract::product::ProductId;
 use contract::quantity::Quantity;
 use contract::time::Period;
 use futures::stream::{FuturesOrdered, StreamExt as _};
+use tokio::sync::mpsc;
 
 use super::Pipeline;
-use super::metrics::ended;
+use super::metrics::{Metrics, ended};
 use super::progress::Stage;
-use crate::decode::DecodedGrid;
-use crate::error::{Rejection, Stop};
+use crate::check::Found;
+use crate::decode::DecodedBand;
+use crate::encode::{EncodedGrid, Encoding};
+use crate::error::{IngestError, Rejection, Stop};
 use crate::fetch::RawGranule;
 use crate::limits::memory;
 use crate::plan::PlannedGranule;
 use crate::put::reading::Reading;
-use crate::{check, decode, encode, put};
+use crate::{decode, put};
 
 impl Pipeline<'_> {
     /// All steps of a file that hold a value, and what was masked in all of its steps.
@@ -33,7 +38,8 @@ impl Pipeline<'_> {
         mut planned: PlannedGranule,
         newest: Option<&Manifest>,
     ) -> Result<(Reading, MaskedCells), Stop> {
-        let at_once = memory::grids_at_once(&planned);
+        let limits = &self.settings.limits;
+        let at_once = memory::grids_at_once(&planned, limits);
         let grids = Grids {
             pipeline: *self,
             shown,
@@ -41,6 +47,7 @@ impl Pipeline<'_> {
             quantity: planned.target.quantity,
             product: planned.target.product.clone(),
             grid: planned.mapping.grid,
+            bands: bands(&planned.mapping.grid, limits.band_cells).collect(),
             variable: planned.variable.name.clone(),
             raw: planned.raw.clone(),
             newest,
@@ -83,13 +90,15 @@ struct Grids<'a> {
     quantity: Quantity,
     product: ProductId,
     grid: Grid,
+    /// Rows of the grid that are worked on together, from the north.
+    bands: Vec<Range<u32>>,
     variable: String,
     raw: RawGranule,
     newest: Option<&'a Manifest>,
 }
 
 impl Grids<'_> {
-    /// All steps that hold a value, and what was masked in all. The reader reads one after the other; what is to be done
+    /// All steps that hold a value, and what was masked in all. The reader reads one band after the other; what is to be done
     /// with each is done beside that.
     async fn all(&self, planned: &mut PlannedGranule, at_once: usize) -> Result<Stored, Stop> {
         let Pipeline {
@@ -98,19 +107,35 @@ impl Grids<'_> {
         let mut stored = FuturesOrdered::new();
         let mut all = Stored::default();
         for index in 0..self.count {
-            let step = planned.steps[index];
-            progress.stage(self.shown, Stage::Decode, index + 1, self.count);
-            let mut decoding = pin!(metrics.timed("decode", decode::run(planned, step)));
-            let decoded = loop {
-                tokio::select! {
-                    decoded = &mut decoding => break decoded?,
-                    Some(done) = stored.next() => all.take(done?),
-                }
-            };
-            stored.push_back(self.grid(index, decoded));
             while stored.len() >= at_once {
                 if let Some(done) = stored.next().await {
                     all.take(done?);
+                }
+            }
+            let step = planned.steps[index];
+            progress.stage(self.shown, Stage::Decode, index + 1, self.count);
+            // One band is worked on while the next is read, and no further one is asked for.
+            let (given, taken) = mpsc::channel(1);
+            stored.push_back(self.grid(index, step.period, taken));
+            for rows in &self.bands {
+                let mut decoding = pin!(async {
+                    let Ok(room) = given.reserve().await else {
+                        return Ok(None);
+                    };
+                    let decoded = decode::run(planned, step, rows.clone());
+                    let decoded = metrics.timed("decode", decoded).await?;
+                    room.send(decoded);
+                    Ok::<_, Stop>(Some(()))
+                });
+                let is_taken = loop {
+                    tokio::select! {
+                        decoded = &mut decoding => break decoded?.is_some(),
+                        Some(done) = stored.next() => all.take(done?),
+                    }
+                };
+                // Nobody takes it: why is the answer of the step, or of one before.
+                if !is_taken {
+                    break;
                 }
             }
         }
@@ -120,43 +145,116 @@ impl Grids<'_> {
         Ok(all)
     }
 
-    /// One time step that was decoded, with the range of its values: check, encode, put; and what was masked in it. None if it
-    /// holds no value at all.
+    /// One time step whose bands are decoded, with the range of its values: check, encode, put; and what was masked in it. None if
+    /// it holds no value at all.
     async fn grid(
         &self,
         index: usize,
-        decoded: DecodedGrid,
+        period: Period,
+        mut decoded: mpsc::Receiver<DecodedBand>,
     ) -> Result<(Option<(Step, [f64; 2])>, MaskedCells), Stop> {
         let Pipeline {
-            store, progress, ..
+            store,
+            progress,
+            settings,
+            ..
         } = self.pipeline;
-        progress.stage(self.shown, Stage::Check, index + 1, self.count);
-        let (quantity, product, grid) = (self.quantity, self.product.clone(), self.grid);
-        let (variable, metrics) = (self.variable.clone(), self.pipeline.metrics.clone());
-        let (encoded, masked) = tokio::task::spawn_blocking(move || {
-            let running = metrics.start("check");
-            let checked = check::run(decoded, quantity, &variable).map_err(Stop::from);
-            running.done(ended(&checked));
-            let checked = checked?;
-            if checked.valid_cells == 0 {
-                return Ok::<_, Stop>((None, checked.masked));
+        let mut work = Work {
+            grid: self.grid,
+            period,
+            quantity: self.quantity,
+            product: self.product.clone(),
+            variable: self.variable.clone(),
+            spool: settings.spool.clone(),
+            metrics: self.pipeline.metrics.clone(),
+            found: Found::nothing(),
+            rows_done: 0,
+            encoding: None,
+        };
+        while let Some(band) = decoded.recv().await {
+            if work.rows_done == 0 {
+                progress.stage(self.shown, Stage::Check, index + 1, self.count);
             }
-            let running = metrics.start("encode");
-            let encoded = encode::run(&checked, &product, &grid).map_err(Stop::from);
-            running.done(ended(&encoded));
-            encoded.map(|encoded| (Some((encoded, checked.range())), checked.masked))
-        })
-        .await??;
-        let Some((encoded, range)) = encoded else {
-            return Ok((None, masked));
+            work = tokio::task::spawn_blocking(move || work.band(band)).await??;
+        }
+        let found = work.found;
+        let encoded = tokio::task::spawn_blocking(move || work.finish()).await??;
+        let Some(encoded) = encoded else {
+            return Ok((None, found.masked));
         };
         progress.stage(self.shown, Stage::Put, index + 1, self.count);
-        let there = self
-            .newest
-            .and_then(|newest| field_of(newest, encoded.period));
+        let there = self.newest.and_then(|newest| field_of(newest, period));
         let put = async { Ok(put::run(store, encoded, &self.raw, &self.grid, there).await?) };
         let stored = self.pipeline.metrics.timed("put", put).await?;
-        Ok((Some((stored, range)), masked))
+        Ok((Some((stored, found.range())), found.masked))
+    }
+}
+
+/// One step of which bands are checked and encoded, on a thread that may take its time.
+struct Work {
+    grid: Grid,
+    period: Period,
+    quantity: Quantity,
+    product: ProductId,
+    variable: String,
+    spool: PathBuf,
+    metrics: Metrics,
+    found: Found,
+    rows_done: u32,
+    /// From the first band on that holds a value.
+    encoding: Option<Encoding>,
+}
+
+impl Work {
+    fn band(mut self, band: DecodedBand) -> Result<Self, Stop> {
+        let rows = (band.values.len() / (self.grid.cols as usize).max(1)) as u32;
+        let empty_rows = self.rows_done;
+        self.rows_done += rows;
+        let running = self.metrics.start("check");
+        let checked = self.found.band(band, self.quantity);
+        // A file that is refused has nothing encoded after its last band.
+        let whole = if self.rows_done == self.grid.rows {
+            let found = self.found.check(self.quantity, &self.variable, self.period);
+            found.map_err(Stop::from)
+        } else {
+            Ok(())
+        };
+        running.done(ended(&whole));
+        whole?;
+        if self.found.valid_cells == 0 {
+            return Ok(self);
+        }
+        let running = self.metrics.start("encode");
+        let encoded = self.encoding(empty_rows).and_then(|mut encoding| {
+            encoding.band(&checked)?;
+            Ok(encoding)
+        });
+        let encoded = encoded.map_err(Stop::from);
+        running.done(ended(&encoded));
+        self.encoding = Some(encoded?);
+        Ok(self)
+    }
+
+    fn encoding(&mut self, empty_rows: u32) -> Result<Encoding, IngestError> {
+        match self.encoding.take() {
+            Some(encoding) => Ok(encoding),
+            None => Encoding::begin(&self.spool, &self.grid, self.period, empty_rows),
+        }
+    }
+
+    /// The field; none if no band holds a value.
+    fn finish(self) -> Result<Option<EncodedGrid>, Stop> {
+        let Some(encoding) = self.encoding else {
+            return Ok(None);
+        };
+        let (key, field) = encoding.finish(&self.product)?;
+        Ok(Some(EncodedGrid {
+            period: self.period,
+            key,
+            field,
+            valid_cells: self.found.valid_cells,
+            masked: self.found.masked,
+        }))
     }
 }
 

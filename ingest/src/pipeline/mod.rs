@@ -167,7 +167,9 @@ impl Pipeline<'_> {
             let answer = commit::answer_unchanged(self.store, way.notice, unchanged, None);
             return Ok(Prepared::Answered(answer.await?));
         }
-        let _pass = seat.with_memory(memory::of_grids(&planned)).await;
+        let _pass = seat
+            .with_memory(memory::of_grids(&planned, &self.settings.limits))
+            .await;
         let (reading, masked) = self.grids(way.shown, planned, newest.as_ref()).await?;
         match reading.put(self.store, &product).await {
             // A program that reads otherwise under the same version noted it: the file lands all the same.

@@ -24,7 +24,7 @@ impl Pipeline<'_> {
             );
             return Err(Rejection::new(RejectReason::TooLarge, "file", detail).into());
         }
-        let (content, product) = (raw.content().await?, way.order.product.clone());
+        let (content, product) = (raw.bytes().await?, way.order.product.clone());
         let file_name = raw.file_name.clone();
         let read = move || {
             let source = observation::Source {

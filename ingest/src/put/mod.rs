@@ -36,10 +36,11 @@ pub(crate) async fn raw(
     raw: &RawGranule,
 ) -> Result<(), IngestError> {
     let key = ObjectKey::raw(product, &raw.sha256);
-    store
-        .put_new(&key, raw.content().await?)
-        .await
-        .map_err(IngestError::storage("store the file"))?;
+    if let Err(error) = store.put_new_content(&key, raw.content().await?).await {
+        // It was compared with its digest on the way: that it changed is no fault of the store.
+        raw.check_unchanged()?;
+        return Err(IngestError::storage("store the file")(error));
+    }
     Ok(())
 }
 
@@ -66,7 +67,7 @@ pub(crate) async fn run(
     };
     if settled == key {
         store
-            .put_new(&key, field)
+            .put_new_content(&key, field)
             .await
             .map_err(IngestError::storage("store a field"))?;
     }

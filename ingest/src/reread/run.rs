@@ -145,7 +145,9 @@ impl Work<'_> {
         let inspected = inspect::run(raw, settings).await?;
         let planned = plan::run(inspected, wish, settings).await?;
         let newest = self.pipeline.newest(&planned).await?;
-        let _pass = seat.with_memory(memory::of_grids(&planned)).await;
+        let _pass = seat
+            .with_memory(memory::of_grids(&planned, &settings.limits))
+            .await;
         let (reading, _masked) = self.pipeline.grids(shown, planned, newest.as_ref()).await?;
         reading
             .put(store, self.product)

@@ -5,6 +5,7 @@
 
 mod attributes;
 mod axes;
+mod bands;
 mod bad_input;
 mod cf_files;
 mod cleaned;

@@ -13,6 +13,8 @@ const DIGEST_BYTES: usize = 32;
 const SEAL_BYTES: usize = MARK.len() + DIGEST_BYTES;
 /// Length of the footer and the format's name, the last bytes of a Parquet file.
 const END_BYTES: usize = 8;
+/// The same, for who reads them first.
+pub(crate) const PARQUET_END_BYTES: u64 = END_BYTES as u64;
 const PARQUET: &[u8; 4] = b"PAR1";
 /// Begins a frame that decoders of zstd skip (RFC 8878, section 3.1.2), and the length of what follows in it.
 const SKIPPED: [u8; 4] = 0x184D_2A50_u32.to_le_bytes();
@@ -96,6 +98,72 @@ pub(crate) fn of_parquet(content: &[u8]) -> Seal {
         // A mark or a digest alone: the other one was there.
         Some((true, false) | (false, true)) => Seal::Broken,
         Some((false, false)) | None => Seal::Absent,
+    }
+}
+
+/// Seals a Parquet file whose pages are hashed already: `end` is all behind the last of them, indexes of pages and footer.
+pub(crate) fn parquet_end(mut pages: Sha256, mut end: Vec<u8>) -> Vec<u8> {
+    if let Some(footer) = footer_of(&end) {
+        pages.update(&end);
+        let digest: [u8; DIGEST_BYTES] = pages.finalize().into();
+        end.splice(footer..footer, MARK.iter().copied().chain(digest));
+    }
+    end
+}
+
+/// The seal of a Parquet file that comes piece by piece.
+pub(crate) struct SealCheck {
+    /// Where the seal should lie; none if the file has no place for one.
+    place: Option<std::ops::Range<u64>>,
+    at: u64,
+    others: Sha256,
+    seal: Vec<u8>,
+}
+
+impl SealCheck {
+    /// Of a file of so many bytes that ends in these ([`PARQUET_END_BYTES`] of them).
+    pub(crate) fn new(size_bytes: u64, end: &[u8]) -> Self {
+        let place = || {
+            let (length, name) = end.split_first_chunk::<4>()?;
+            let footer = u64::from(u32::from_le_bytes(*length)) + PARQUET_END_BYTES;
+            let seal_end = size_bytes.checked_sub(footer).filter(|_| name == PARQUET)?;
+            Some(seal_end.checked_sub(SEAL_BYTES as u64)?..seal_end)
+        };
+        Self {
+            place: place(),
+            at: 0,
+            others: Sha256::new(),
+            seal: vec![],
+        }
+    }
+
+    /// Takes the next bytes.
+    pub(crate) fn update(&mut self, piece: &[u8]) {
+        let (start, end) = self.place.clone().map_or((0, 0), |p| (p.start, p.end));
+        let inside = |place: u64| {
+            let offset = place.clamp(self.at, self.at + piece.len() as u64) - self.at;
+            offset as usize
+        };
+        let (first, last) = (inside(start), inside(end));
+        self.others.update(&piece[..first]);
+        self.seal.extend_from_slice(&piece[first..last]);
+        self.others.update(&piece[last..]);
+        self.at += piece.len() as u64;
+    }
+
+    /// What became of the seal.
+    pub(crate) fn finish(self) -> Seal {
+        if self.seal.len() != SEAL_BYTES {
+            return Seal::Absent;
+        }
+        let (mark, told) = self.seal.split_at(MARK.len());
+        let found: [u8; DIGEST_BYTES] = self.others.finalize().into();
+        match (mark == MARK, told == found) {
+            (true, true) => Seal::Whole,
+            // A mark or a digest alone: the other one was there.
+            (true, false) | (false, true) => Seal::Broken,
+            (false, false) => Seal::Absent,
+        }
     }
 }
 
@@ -190,17 +258,33 @@ mod tests {
         }
     }
 
+    /// The seal of a file that comes in pieces of seven bytes.
+    fn of_pieces(file: &[u8]) -> Seal {
+        let end = &file[file.len().saturating_sub(END_BYTES)..];
+        let mut check = SealCheck::new(file.len() as u64, end);
+        file.chunks(7).for_each(|piece| check.update(piece));
+        check.finish()
+    }
+
     #[test]
     fn no_bit_of_a_sealed_table_can_change_unseen() {
         // Pages, a footer of three bytes, its length, the format's name.
         let file = b"PAR1pages\x01\x02\x03\x03\0\0\0PAR1".to_vec();
         assert_eq!(of_parquet(&file), Seal::Absent);
-        let sealed = parquet(file);
-        assert_eq!(of_parquet(&sealed), Seal::Whole);
+        let sealed = parquet(file.clone());
+        let (pages, end) = file.split_at(6);
+        let in_parts = parquet_end(Sha256::new_with_prefix(pages), end.to_vec());
+        assert_eq!([pages, &in_parts].concat(), sealed);
+        assert_eq!(
+            (of_parquet(&sealed), of_pieces(&sealed)),
+            (Seal::Whole, Seal::Whole)
+        );
+        assert_eq!(of_pieces(&file), Seal::Absent);
         for at in 0..sealed.len() * 8 {
             let mut flipped = sealed.clone();
             flipped[at / 8] ^= 1 << (at % 8);
             assert_ne!(of_parquet(&flipped), Seal::Whole, "bit {at}");
+            assert_ne!(of_pieces(&flipped), Seal::Whole, "bit {at}");
         }
         assert_eq!(of_parquet(b""), Seal::Absent);
         assert_eq!(of_parquet(b"\xff\xff\xff\xffPAR1"), Seal::Absent);

@@ -63,7 +63,7 @@ impl Store {
     /// One conditional creation, without the reading back that would hide what the store does.
     async fn create_once(&self, key: &ObjectKey, content: &Bytes) -> Result<(), Error> {
         if let Place::Folder(root) = &self.place {
-            return folder::create(root.clone(), key.clone(), content.clone()).await;
+            return folder::create(root.clone(), key.clone(), content.clone().into()).await;
         }
         let options = PutOptions::from(PutMode::Create);
         let payload = PutPayload::from_bytes(content.clone());

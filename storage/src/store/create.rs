@@ -3,17 +3,20 @@
 use bytes::Bytes;
 use contract::key::ObjectKey;
 use contract::kind::Vouched;
-use futures::{StreamExt as _, TryStreamExt as _, stream};
-use object_store::{Error, ObjectStoreExt as _, PutMode, PutOptions, PutPayload};
+use futures::stream::FuturesUnordered;
+use futures::{StreamExt as _, TryStreamExt as _};
+use object_store::{Error, MultipartUpload, ObjectStoreExt as _, PutMode, PutOptions, PutPayload};
 
 use super::{
-    MAX_OBJECT_BYTES, PART_BYTES, PARTS_AT_ONCE, Place, Store, failed, folder, hdfs, path,
+    MAX_OBJECT_BYTES, MAX_SPOOLED_BYTES, PART_BYTES, PARTS_AT_ONCE, Place, Store, failed, folder,
+    hdfs, path,
 };
-use crate::off_thread::off_thread;
+use crate::content::{Content, Pieces};
+use crate::sound::large;
 use crate::{StorageError, sound};
 
 /// Above this size an object that is named by its content is sent to a cloud in parts.
-const WHOLE_BYTES: usize = 64 << 20;
+const WHOLE_BYTES: u64 = 64 << 20;
 
 impl Store {
     /// Creates an object: true if the store said that it was written now, false if the same content is there.
@@ -36,6 +39,23 @@ impl Store {
                 key.as_str(),
                 "it is larger than 2 GiB",
             ));
+        }
+        self.put_new_content(key, content.into()).await
+    }
+
+    /// The same of content that may lie in a file, which is not read into memory: a folder has it copied, other stores have it in
+    /// parts. It is created once, compared and named as what is in memory is.
+    ///
+    /// # Errors
+    /// Those of [`Store::put_new`]; one that does not pass if a file is not what its name says.
+    pub async fn put_new_content(
+        &self,
+        key: &ObjectKey,
+        content: Content,
+    ) -> Result<bool, StorageError> {
+        if content.size_bytes() > MAX_SPOOLED_BYTES {
+            let reason = format!("it is larger than {} GiB", MAX_SPOOLED_BYTES >> 30);
+            return Err(StorageError::damaged(key.as_str(), reason));
         }
         if hdfs::is_half_written(last_part(key)) {
             let reason = "names like .NAME.tmp.1 are those of half-written objects";
@@ -64,55 +84,69 @@ impl Store {
     }
 
     /// What becomes of an object where other bytes are.
-    async fn put_beside(&self, key: &ObjectKey, content: Bytes) -> Result<bool, StorageError> {
+    async fn put_beside(&self, key: &ObjectKey, content: Content) -> Result<bool, StorageError> {
         if key.vouches() == Vouched::Nothing {
             return Err(StorageError::Conflict { key: key.clone() });
         }
-        let theirs = self.fetch(key).await?;
-        let of = |key: &ObjectKey, content: &Bytes| {
-            let (key, content) = (key.clone(), content.clone());
-            off_thread(move || sound::of_object(&key, &content))
-        };
-        match of(key, &theirs).await {
+        match large::of_stored(self, key).await {
             Ok(_sound) => Ok(false),
-            Err(error) => {
-                of(key, &content).await?;
+            Err(error @ StorageError::Damaged { .. }) => {
+                sound::of_content(key, &content).await?;
                 tracing::warn!(%key, %error, "a damaged object is replaced by the whole one");
-                self.put_over(key, content).await.map(|()| true)
+                self.put_content_over(key, content).await.map(|()| true)
             }
+            Err(error) => Err(error),
         }
     }
 
     /// Stores an object in the place of what is there: for one that was found damaged and can be made again, or that an
     /// older program wrote. Nothing else ever changes.
     pub async fn put_over(&self, key: &ObjectKey, content: Bytes) -> Result<(), StorageError> {
+        self.put_content_over(key, content.into()).await
+    }
+
+    async fn put_content_over(
+        &self,
+        key: &ObjectKey,
+        content: Content,
+    ) -> Result<(), StorageError> {
         let sent = match &self.place {
             Place::Folder(root) => {
-                let bytes = content.len();
+                let bytes = content.size_bytes();
                 let put = folder::replace(root.clone(), key.clone(), content).await;
                 put.inspect(|()| self.wrote(bytes))
             }
+            Place::Cloud | Place::Hdfs if !matches!(content, Content::Bytes(_)) => {
+                self.upload(key, &content).await
+            }
             Place::Cloud | Place::Hdfs | Place::Memory => {
-                let payload = PutPayload::from_bytes(content);
-                let sent = self.objects.put(&path(key), payload).await;
-                sent.map(|_put| ())
+                let payload = content.whole().map_err(|e| folder::failed(key, e));
+                match payload.map(PutPayload::from_bytes) {
+                    Ok(payload) => self.objects.put(&path(key), payload).await.map(|_put| ()),
+                    Err(e) => Err(e),
+                }
             }
         };
         sent.map_err(|e| failed(key, e))
     }
 
-    async fn create(&self, key: &ObjectKey, content: &Bytes) -> Result<(), Error> {
-        match &self.place {
-            Place::Folder(root) => {
+    async fn create(&self, key: &ObjectKey, content: &Content) -> Result<(), Error> {
+        let is_named = key.vouches() != Vouched::Nothing;
+        match (&self.place, content) {
+            (Place::Folder(root), _) => {
                 let made = folder::create(root.clone(), key.clone(), content.clone()).await;
-                made.inspect(|()| self.wrote(content.len()))
+                made.inspect(|()| self.wrote(content.size_bytes()))
             }
-            Place::Cloud if content.len() > WHOLE_BYTES && key.vouches() != Vouched::Nothing => {
+            (Place::Cloud, _) if content.size_bytes() > WHOLE_BYTES && is_named => {
                 self.send_parts(key, content).await
             }
-            Place::Cloud | Place::Hdfs | Place::Memory => {
+            (Place::Hdfs, Content::File(..) | Content::Made(..)) if is_named => {
+                self.send_parts(key, content).await
+            }
+            (Place::Cloud | Place::Hdfs | Place::Memory, _) => {
                 let options = PutOptions::from(PutMode::Create);
-                let payload = PutPayload::from_bytes(content.clone());
+                let whole = content.whole().map_err(|e| folder::failed(key, e))?;
+                let payload = PutPayload::from_bytes(whole);
                 let sent = self.objects.put_opts(&path(key), payload, options).await;
                 sent.map(|_put| ())
             }
@@ -120,30 +154,22 @@ impl Store {
     }
 
     /// Sends an object in parts; nothing is seen of it before its end.
-    async fn send_parts(&self, key: &ObjectKey, content: &Bytes) -> Result<(), Error> {
-        let path = path(key);
-        match self.objects.head(&path).await {
-            Ok(_there) => {
-                return Err(Error::AlreadyExists {
-                    path: key.to_string(),
-                    source: "it was there before the upload".into(),
-                });
-            }
-            Err(Error::NotFound { .. }) => {}
-            Err(e) => return Err(e),
+    async fn send_parts(&self, key: &ObjectKey, content: &Content) -> Result<(), Error> {
+        match self.objects.head(&path(key)).await {
+            Ok(_there) => Err(Error::AlreadyExists {
+                path: key.to_string(),
+                source: "it was there before the upload".into(),
+            }),
+            Err(Error::NotFound { .. }) => self.upload(key, content).await,
+            Err(e) => Err(e),
         }
-        let mut upload = self.objects.put_multipart(&path).await?;
-        let ends = (0..content.len()).step_by(PART_BYTES as usize);
-        let parts: Vec<_> = ends
-            .map(|at| content.slice(at..content.len().min(at + PART_BYTES as usize)))
-            .map(|part| upload.put_part(PutPayload::from_bytes(part)))
-            .collect();
-        let sent = stream::iter(parts)
-            .buffer_unordered(PARTS_AT_ONCE)
-            .try_collect::<Vec<()>>()
-            .await;
-        let ended = match sent {
-            Ok(_parts) => upload.complete().await.map(|_put| ()),
+    }
+
+    async fn upload(&self, key: &ObjectKey, content: &Content) -> Result<(), Error> {
+        let mut upload = self.objects.put_multipart(&path(key)).await?;
+        let pieces = content.pieces(key, PART_BYTES);
+        let ended = match send(key, upload.as_mut(), pieces).await {
+            Ok(()) => upload.complete().await.map(|_put| ()),
             Err(e) => Err(e),
         };
         if ended.is_err()
@@ -158,27 +184,27 @@ impl Store {
     pub(super) async fn holds(
         &self,
         key: &ObjectKey,
-        content: &Bytes,
+        content: &Content,
     ) -> Result<Option<bool>, StorageError> {
         let found = match self.objects.get(&path(key)).await {
             Ok(found) => found,
             Err(Error::NotFound { .. }) => return Ok(None),
             Err(e) => return Err(failed(key, e)),
         };
-        if found.meta.size != content.len() as u64 {
+        if found.meta.size != content.size_bytes() {
             return Ok(Some(false));
         }
         let mut pieces = found.into_stream();
         let mut at = 0;
         while let Some(piece) = pieces.next().await {
             let piece = piece.map_err(|e| failed(key, e))?;
-            let end = at + piece.len();
-            if content.get(at..end) != Some(&piece[..]) {
+            let end = at + piece.len() as u64;
+            if !content.part(at..end).is_ok_and(|own| own == piece) {
                 return Ok(Some(false));
             }
             at = end;
         }
-        Ok(Some(at == content.len()))
+        Ok(Some(at == content.size_bytes()))
     }
 
     fn refused(&self, key: &ObjectKey, error: Error) -> StorageError {
@@ -200,6 +226,29 @@ impl Store {
             other => !crate::error::may_pass(other),
         }
     }
+}
+
+/// Sends pieces in their order, a few at a time; a file is read no further than these.
+async fn send(
+    key: &ObjectKey,
+    upload: &mut dyn MultipartUpload,
+    mut pieces: Pieces,
+) -> Result<(), Error> {
+    let mut sending = FuturesUnordered::new();
+    loop {
+        // Reading may wait for a disk.
+        let read = tokio::task::spawn_blocking(move || (pieces.next(), pieces)).await;
+        let (piece, rest) = read.map_err(Error::from)?;
+        pieces = rest;
+        let Some(piece) = piece else { break };
+        let piece = piece.map_err(|e| folder::failed(key, e))?;
+        sending.push(upload.put_part(PutPayload::from_bytes(piece)));
+        while sending.len() >= PARTS_AT_ONCE {
+            sending.try_next().await?;
+        }
+    }
+    while sending.try_next().await?.is_some() {}
+    Ok(())
 }
 
 fn last_part(key: &ObjectKey) -> &str {

@@ -5,8 +5,9 @@ use std::io::{self, ErrorKind, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use bytes::Bytes;
 use contract::key::ObjectKey;
+
+use crate::content::{Content, PIECE_BYTES};
 
 /// How often a folder may vanish under a writer: a removal takes emptied folders along.
 const ATTEMPTS: usize = 16;
@@ -20,7 +21,7 @@ static NEXT: AtomicU64 = AtomicU64::new(0);
 pub(super) async fn create(
     root: PathBuf,
     key: ObjectKey,
-    content: Bytes,
+    content: Content,
 ) -> Result<(), object_store::Error> {
     put(root, key, content, |from, to| fs::hard_link(from, to)).await
 }
@@ -29,14 +30,15 @@ pub(super) async fn create(
 pub(super) async fn replace(
     root: PathBuf,
     key: ObjectKey,
-    content: Bytes,
+    content: Content,
 ) -> Result<(), object_store::Error> {
     put(root, key, content, |from, to| fs::rename(from, to)).await
 }
 
 /// The same at once, for who is on a thread that may wait.
 pub(super) fn replace_now(root: &Path, path: &Path, content: &[u8]) -> io::Result<()> {
-    write(path, content, |from, to| fs::rename(from, to))?;
+    let fill = |file: &mut File| file.write_all(content);
+    write(path, fill, |from, to| fs::rename(from, to))?;
     flush_folders(root, path)
 }
 
@@ -46,12 +48,18 @@ type Naming = fn(&Path, &Path) -> io::Result<()>;
 async fn put(
     root: PathBuf,
     key: ObjectKey,
-    content: Bytes,
+    content: Content,
     name: Naming,
 ) -> Result<(), object_store::Error> {
     let path = root.join(key.as_str());
+    let pieces = content.pieces(&key, PIECE_BYTES);
     let written = tokio::task::spawn_blocking(move || {
-        let written = write(&path, &content, name);
+        let fill = |file: &mut File| {
+            pieces
+                .into_iter()
+                .try_for_each(|piece| file.write_all(&piece?))
+        };
+        let written = write(&path, fill, name);
         if matches!(&written, Ok(()))
             || matches!(&written, Err(e) if e.kind() == ErrorKind::AlreadyExists)
         {
@@ -67,10 +75,13 @@ async fn put(
     }
 }
 
-fn write(path: &Path, content: &[u8], name: Naming) -> io::Result<()> {
+fn write(
+    path: &Path,
+    fill: impl FnOnce(&mut File) -> io::Result<()>,
+    name: Naming,
+) -> io::Result<()> {
     let (mut file, staging) = stage(path)?;
-    let written = file
-        .write_all(content)
+    let written = fill(&mut file)
         .and_then(|()| file.sync_all())
         .and_then(|()| name(&staging, path));
     let removed = fs::remove_file(&staging);
@@ -139,6 +150,10 @@ pub(super) fn failed(key: &ObjectKey, source: io::Error) -> object_store::Error 
                 source: source.into(),
             }
         }
+        // What is to be stored is not what its name says: no store could take it.
+        ErrorKind::InvalidData => object_store::Error::NotSupported {
+            source: source.into(),
+        },
         _ => object_store::Error::Generic {
             store: "folder",
             source: source.into(),
@@ -160,18 +175,20 @@ mod tests {
             fs::write(folder.path().join(name), "half").unwrap();
         }
         let root = folder.path().to_owned();
-        create(root.clone(), key.clone(), Bytes::from("whole"))
+        let content = |text: &'static str| Content::Bytes(text.into());
+        create(root.clone(), key.clone(), content("whole"))
             .await
             .unwrap();
         assert_eq!(fs::read(folder.path().join("a/b")).unwrap(), b"whole");
-        let again = create(root, key, Bytes::from("other")).await;
+        let again = create(root, key, content("other")).await;
         assert!(matches!(
             again,
             Err(object_store::Error::AlreadyExists { .. })
         ));
         let root = folder.path().to_owned();
-        let over = ("a/b".parse().unwrap(), Bytes::from("over"));
-        replace(root, over.0, over.1).await.unwrap();
+        replace(root, "a/b".parse().unwrap(), content("over"))
+            .await
+            .unwrap();
         assert_eq!(fs::read(folder.path().join("a/b")).unwrap(), b"over");
         let left = fs::read_dir(folder.path().join("a")).unwrap().count();
         assert_eq!(left, 4, "the object and the three files that were there");
@@ -182,7 +199,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         fs::write(folder.path().join("a"), "file").unwrap();
         let key: ObjectKey = "a/b".parse().unwrap();
-        let made = create(folder.path().to_owned(), key, Bytes::from("x")).await;
+        let made = create(folder.path().to_owned(), key, Content::Bytes("x".into())).await;
         assert!(
             matches!(made, Err(object_store::Error::Generic { .. })),
             "{made:?}"

@@ -34,18 +34,27 @@ impl Store {
 
     /// The bytes under a key, whatever they are.
     pub(crate) async fn fetch(&self, key: &ObjectKey) -> Result<Bytes, StorageError> {
+        let found = self.fetch_up_to(key, MAX_OBJECT_BYTES).await?;
+        let larger = "it is larger than the 2 GiB that are read at once";
+        found.ok_or_else(|| StorageError::damaged(key.as_str(), larger))
+    }
+
+    /// The same of an object of at most so many bytes; none if it is larger.
+    pub(crate) async fn fetch_up_to(
+        &self,
+        key: &ObjectKey,
+        most_bytes: u64,
+    ) -> Result<Option<Bytes>, StorageError> {
         let path = path(key);
         let found = self.objects.get(&path).await.map_err(|e| failed(key, e))?;
         let size_bytes = found.meta.size;
-        if size_bytes > MAX_OBJECT_BYTES {
-            return Err(StorageError::damaged(
-                key.as_str(),
-                "it is larger than 2 GiB",
-            ));
+        if size_bytes > most_bytes {
+            return Ok(None);
         }
         let is_file = matches!(found.payload, GetResultPayload::File(..));
         if is_file || size_bytes <= PART_BYTES {
-            return found.bytes().await.map_err(|e| failed(key, e));
+            let content = found.bytes().await.map_err(|e| failed(key, e))?;
+            return Ok(Some(content));
         }
         drop(found);
         let starts = (0..size_bytes).step_by(PART_BYTES as usize);
@@ -61,7 +70,7 @@ impl Store {
             let reason = format!("{} of {size_bytes} bytes came", content.len());
             return Err(StorageError::damaged(key.as_str(), reason));
         }
-        Ok(content.freeze())
+        Ok(Some(content.freeze()))
     }
 
     /// A part of an object, `range_bytes` from its beginning. It is not checked: whoever reads parts has a check of them.

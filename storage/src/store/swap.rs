@@ -74,7 +74,7 @@ impl Store {
     ) -> Result<Option<Seen>, StorageError> {
         match &self.place {
             Place::Folder(root) => {
-                let (limit, bytes) = (self.retry_limits.retries, content.len());
+                let (limit, bytes) = (self.retry_limits.retries, content.len() as u64);
                 let swapped = locked::swap(root.clone(), key.clone(), seen, content, limit);
                 let swapped = swapped.await.map_err(|e| failed(key, e))?;
                 Ok(swapped.inspect(|_seen| self.wrote(bytes)))

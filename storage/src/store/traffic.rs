@@ -84,9 +84,9 @@ impl Traffic {
     }
 
     /// An object was written past the layer that counts.
-    pub(super) fn wrote(&self, bytes: usize) {
+    pub(super) fn wrote(&self, bytes: u64) {
         add(&self.writes, 1);
-        add(&self.written_bytes, bytes as u64);
+        add(&self.written_bytes, bytes);
     }
 }
 
@@ -113,7 +113,7 @@ impl Store {
     }
 
     /// An object was written without a request: a folder's file.
-    pub(super) fn wrote(&self, bytes: usize) {
+    pub(super) fn wrote(&self, bytes: u64) {
         if let Some(traffic) = &self.traffic {
             traffic.wrote(bytes);
         }
@@ -143,7 +143,7 @@ impl ObjectStore for Counted {
     async fn put_opts(&self, at: &Path, what: PutPayload, o: PutOptions) -> Result<PutResult> {
         let bytes = what.content_length();
         let put = self.inner.put_opts(at, what, o).await?;
-        self.traffic.wrote(bytes);
+        self.traffic.wrote(bytes as u64);
         Ok(put)
     }
 

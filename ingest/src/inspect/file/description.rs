@@ -120,6 +120,28 @@ pub(crate) enum Part {
     All,
     /// One index.
     At(u64),
+    /// So many indices from the first on.
+    Some { first: u64, count: u64 },
+}
+
+impl Part {
+    /// First index and number of indices of a dimension of this length; none if it has not so many.
+    pub(crate) fn span(self, len: u64) -> Option<(u64, u64)> {
+        let (first, count) = match self {
+            Self::All => (0, len),
+            Self::At(index) => (index, 1),
+            Self::Some { first, count } => (first, count),
+        };
+        (first.checked_add(count)? <= len).then_some((first, count))
+    }
+
+    /// Does the dimension stay one in what is read?
+    pub(crate) fn is_dimension(self) -> bool {
+        match self {
+            Self::All | Self::Some { .. } => true,
+            Self::At(_) => false,
+        }
+    }
 }
 
 impl Attributes {

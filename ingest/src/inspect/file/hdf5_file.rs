@@ -38,19 +38,14 @@ pub(crate) struct Hdf5File {
 
 impl Hdf5File {
     pub(super) fn open(path: &Path) -> Result<Self, Rejection> {
-        let file = File::with_options()
-            .with_fapl(|access| access.chunk_cache(CHUNK_CACHE_SLOTS, CHUNK_CACHE_BYTES, 1.0))
-            .open(path)
-            .map_err(|e| {
-                corrupt(
-                    "file",
-                    format!(
-                        "cannot be opened as HDF5 ({}); it is truncated or damaged, fetch it again",
-                        first_line(&e)
-                    ),
-                )
-            })?;
-        let description = describe(&file)?;
+        let file = open_with_cache(path, CHUNK_CACHE_BYTES)?;
+        let (description, chunk_bytes) = describe(&file)?;
+        if chunk_bytes <= CHUNK_CACHE_BYTES {
+            return Ok(Self { file, description });
+        }
+        // A chunk larger than the cache is never in it, and would be unpacked again for every band of rows.
+        drop(file);
+        let file = open_with_cache(path, chunk_bytes)?;
         Ok(Self { file, description })
     }
 
@@ -91,19 +86,23 @@ impl Hdf5File {
                 .map(|v| vec![v])
                 .map_err(damaged);
         }
-        let selected: Vec<SliceOrIndex> = (part.iter().zip(&shape))
-            .map(|(part, len)| match part {
-                Part::All => SliceOrIndex::SliceCount {
-                    start: 0,
+        let selected = (part.iter().zip(&shape)).map(|(part, len)| {
+            let (first, count) = part.span(*len as u64)?;
+            Some(if part.is_dimension() {
+                SliceOrIndex::SliceCount {
+                    start: first as usize,
                     step: 1,
-                    count: *len,
+                    count: count as usize,
                     block: 1,
-                },
-                Part::At(index) => SliceOrIndex::Index(*index as usize),
+                }
+            } else {
+                SliceOrIndex::Index(first as usize)
             })
-            .collect();
-        let selection = hdf5::Hyperslab::from(selected);
-        let whole_count = part.iter().filter(|p| **p == Part::All).count();
+        });
+        let selected: Option<Vec<SliceOrIndex>> = selected.collect();
+        let past = || corrupt(name, "an index past its dimension");
+        let selection = hdf5::Hyperslab::from(selected.ok_or_else(past)?);
+        let whole_count = part.iter().filter(|p| p.is_dimension()).count();
         let values = match whole_count {
             1 => dataset
                 .read_slice_1d::<f64, _>(selection)
@@ -114,12 +113,25 @@ impl Hdf5File {
             _ => {
                 return Err(corrupt(
                     name,
-                    format!("{whole_count} whole dimensions asked for, 1 or 2 can be read"),
+                    format!("{whole_count} dimensions asked for, 1 or 2 can be read"),
                 ));
             }
         };
         values.map_err(damaged)
     }
+}
+
+fn open_with_cache(path: &Path, cache_bytes: usize) -> Result<File, Rejection> {
+    let opened = File::with_options()
+        .with_fapl(|access| access.chunk_cache(CHUNK_CACHE_SLOTS, cache_bytes, 1.0))
+        .open(path);
+    opened.map_err(|e| {
+        let detail = format!(
+            "cannot be opened as HDF5 ({}); it is truncated or damaged, fetch it again",
+            first_line(&e)
+        );
+        corrupt("file", detail)
+    })
 }
 
 fn first_line(error: &hdf5::Error) -> String {
@@ -131,7 +143,8 @@ fn first_line(error: &hdf5::Error) -> String {
         .to_owned()
 }
 
-fn describe(file: &File) -> Result<Description, Rejection> {
+/// What is in a file, and bytes of the largest chunk that may be read.
+fn describe(file: &File) -> Result<(Description, usize), Rejection> {
     let mut names = Vec::new();
     file.iter_visit_default(|name, link| {
         if link.link_type == LinkType::Hard
@@ -152,13 +165,14 @@ fn describe(file: &File) -> Result<Description, Rejection> {
         )
     })?;
     let mut variables = Vec::new();
-    let mut most_bytes = 0;
+    let (mut most_bytes, mut most_chunk_bytes) = (0, 0);
     for name in names {
         // A member that is no dataset (a group, a named type) or cannot be opened is passed over.
         if let Ok(dataset) = file.dataset(&name)
             && let Some(variable) = describe_dataset(file, &name, &dataset)?
         {
             most_bytes = most_bytes.max(library_bytes(&dataset, variable.cell_count()));
+            most_chunk_bytes = most_chunk_bytes.max(chunk_bytes(&dataset).unwrap_or(0));
             variables.push(variable);
         }
     }
@@ -167,30 +181,40 @@ fn describe(file: &File) -> Result<Description, Rejection> {
     } else {
         "HDF5"
     };
-    Ok(Description {
+    let description = Description {
         format: format.to_owned(),
         attributes: hdf5_attribute::read_all(file),
         variables,
         library_bytes: most_bytes,
-    })
+    };
+    Ok((description, most_chunk_bytes as usize))
 }
 
 /// Most memory that the library takes to unpack values of a dataset: its cache, as far as there are chunks to fill it,
 /// and one chunk as it lies in the file, as it comes out of a filter, and as the next filter leaves it.
 fn library_bytes(dataset: &Dataset, cells: u128) -> u64 {
     const COPIES_OF_A_CHUNK: u128 = 3;
-    let cell_bytes = dataset.dtype().map_or(8, |t| t.size()) as u128;
-    let Some(chunk) = dataset.chunk() else {
+    let Some(chunk_bytes) = chunk_bytes(dataset) else {
         return 0;
     };
-    let chunk_cells = chunk
-        .iter()
-        .fold(1u128, |n, len| n.saturating_mul(*len as u128));
-    // A larger chunk is refused before it is read.
-    let chunk_bytes = chunk_cells.saturating_mul(cell_bytes).min(MAX_CHUNK_BYTES);
-    let all_bytes = cells.saturating_mul(cell_bytes).max(chunk_bytes);
-    let cache_bytes = all_bytes.min(CHUNK_CACHE_BYTES as u128);
+    let all_bytes = cells.saturating_mul(cell_bytes(dataset)).max(chunk_bytes);
+    let cache_bytes = all_bytes.min(chunk_bytes.max(CHUNK_CACHE_BYTES as u128));
     u64::try_from(cache_bytes + COPIES_OF_A_CHUNK * chunk_bytes).unwrap_or(u64::MAX)
+}
+
+fn cell_bytes(dataset: &Dataset) -> u128 {
+    dataset.dtype().map_or(8, |t| t.size()) as u128
+}
+
+/// Bytes of a chunk, none without chunks; a larger one than may be is refused before it is read.
+fn chunk_bytes(dataset: &Dataset) -> Option<u128> {
+    let cells = dataset.chunk()?.into_iter();
+    let cells = cells.fold(1u128, |n, len| n.saturating_mul(len as u128));
+    Some(
+        cells
+            .saturating_mul(cell_bytes(dataset))
+            .min(MAX_CHUNK_BYTES),
+    )
 }
 
 fn is_scale(variable: &Variable) -> bool {

@@ -12,12 +12,11 @@ use super::EXIT_USAGE;
 use super::protocol::{self, Answer, Opened, Request};
 use crate::error::Rejection;
 use crate::inspect::file::DataFile;
-use crate::inspect::file::description::Part;
 
 /// Open files a reader needs: the three streams, the file, and what the system opens meanwhile.
 const MAX_OPEN_FILES: u64 = 32;
 
-/// Reads one file for a parent process. Arguments: path, memory in bytes, processor time in seconds, cells of one map.
+/// Reads one file for a parent process. Arguments: path, memory in bytes, processor time in seconds, cells of one answer.
 pub fn run_child(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     let arguments: Vec<OsString> = arguments.into_iter().collect();
     match serve(&arguments) {
@@ -35,10 +34,10 @@ fn serve(arguments: &[OsString]) -> Option<std::io::Result<()>> {
         .iter()
         .map(|n| n.to_str()?.parse().ok())
         .collect::<Option<_>>()?;
-    let [memory_bytes, cpu_s, plane_cells] = numbers[..] else {
+    let [memory_bytes, cpu_s, read_cells] = numbers[..] else {
         return None;
     };
-    Some(limit(memory_bytes, cpu_s).and_then(|()| converse(&PathBuf::from(path), plane_cells)))
+    Some(limit(memory_bytes, cpu_s).and_then(|()| converse(&PathBuf::from(path), read_cells)))
 }
 
 /// Limits memory, processor time and open files; no file may be written and no core dumped.
@@ -59,7 +58,7 @@ fn limit(memory_bytes: u64, cpu_s: u64) -> std::io::Result<()> {
     })
 }
 
-fn converse(path: &std::path::Path, plane_cells: u64) -> std::io::Result<()> {
+fn converse(path: &std::path::Path, read_cells: u64) -> std::io::Result<()> {
     let mut input = std::io::stdin().lock();
     let mut out = BufWriter::with_capacity(1 << 20, std::io::stdout().lock());
     let mut file = match DataFile::open(path) {
@@ -84,7 +83,7 @@ fn converse(path: &std::path::Path, plane_cells: u64) -> std::io::Result<()> {
     }
     out.flush()?;
     while let Some(request) = protocol::read::<Request>(&mut input)? {
-        match answer(&mut file, &request, plane_cells) {
+        match answer(&mut file, &request, read_cells) {
             Ok(values) => {
                 protocol::write(
                     &mut out,
@@ -104,21 +103,18 @@ fn converse(path: &std::path::Path, plane_cells: u64) -> std::io::Result<()> {
 }
 
 /// Checks what a request would allocate before it is read.
-fn answer(file: &mut DataFile, request: &Request, plane_cells: u64) -> Result<Vec<f64>, Rejection> {
+fn answer(file: &mut DataFile, request: &Request, read_cells: u64) -> Result<Vec<f64>, Rejection> {
     let name = &request.variable;
     let missing = || Rejection::new(RejectReason::NoVariable, name, "is not in the file");
     let variable = file.description().variable(name).ok_or_else(missing)?;
-    let whole = variable
-        .dimensions
-        .iter()
-        .zip(&request.part)
-        .filter(|(_, part)| **part == Part::All);
-    let cells = whole.fold(
-        u128::from(variable.numbers_a_value()),
-        |n, (dimension, _)| n.saturating_mul(u128::from(dimension.len)),
-    );
-    if cells > u128::from(plane_cells) {
-        let detail = format!("{cells} values at once, at most {plane_cells} are read");
+    // What a part past its dimension would be is refused as such where it is read.
+    let counts = variable.dimensions.iter().zip(&request.part);
+    let counts = counts.map(|(dimension, part)| part.span(dimension.len).map_or(0, |span| span.1));
+    let cells = counts.fold(u128::from(variable.numbers_a_value()), |n, count| {
+        n.saturating_mul(u128::from(count))
+    });
+    if cells > u128::from(read_cells) {
+        let detail = format!("{cells} values at once, at most {read_cells} are read");
         return Err(Rejection::new(RejectReason::TooLarge, name, detail));
     }
     file.read(name, &request.part)

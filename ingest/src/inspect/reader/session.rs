@@ -52,7 +52,7 @@ impl Session {
         let mut child = Command::new(&settings.decoder.program)
             .args(&settings.decoder.arguments)
             .arg(path)
-            .args([limits.memory_bytes, limits.cpu_s, limits.plane_cells].map(|n| n.to_string()))
+            .args([limits.memory_bytes, limits.cpu_s, limits.read_cells].map(|n| n.to_string()))
             .env_clear()
             // "::" switches dynamic plugins of the HDF5 library off altogether.
             .env("HDF5_PLUGIN_PRELOAD", "::")
@@ -95,10 +95,10 @@ impl Session {
         part: &[Part],
         expected: u64,
     ) -> Result<Vec<f64>, Stop> {
-        if expected > self.limits.plane_cells {
+        if expected > self.limits.read_cells {
             let detail = format!(
                 "{expected} values at once, at most {} are read",
-                self.limits.plane_cells
+                self.limits.read_cells
             );
             return Err(Rejection::new(RejectReason::TooLarge, variable, detail).into());
         }

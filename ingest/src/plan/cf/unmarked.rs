@@ -13,46 +13,128 @@ const USUAL: [f64; 18] = [
 /// How near in float32 a number is the one that was meant.
 const SAME: f64 = 1e-6;
 
-/// Refuses values of which one usual number for no data, several times there, lies further from all others than these
-/// from each other.
-///
-/// `values`: stored numbers that are not said to be no data; NaN is passed over.
-#[expect(clippy::float_cmp, reason = "a number for no data is one exact number")]
-pub(crate) fn check(variable: &str, values: &[f64]) -> Result<(), Rejection> {
-    let (lowest, highest, _) = range(values, f64::NAN);
-    for end in [lowest, highest] {
-        let is_usual = USUAL
-            .iter()
-            .any(|usual| (end - usual).abs() <= SAME * usual.abs());
-        if !is_usual {
-            continue;
+/// The ends of many numbers: what tells whether one of them means no data. Those of parts add up to those of the whole.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(crate) struct Ends {
+    /// The lowest and, with the sign turned, the highest; none of no number.
+    ends: Option<[End; 2]>,
+}
+
+/// One end.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct End {
+    number: f64,
+    /// How often it is there.
+    count: u64,
+    /// The lowest number above it.
+    next: Option<f64>,
+}
+
+impl End {
+    #[expect(clippy::float_cmp, reason = "a number for no data is one exact number")]
+    fn add(&mut self, number: f64, count: u64) {
+        if number < self.number {
+            let next = Some(self.number);
+            *self = Self {
+                number,
+                count,
+                next,
+            };
+        } else if number == self.number {
+            self.count += count;
+        } else if self.next.is_none_or(|next| number < next) {
+            self.next = Some(number);
         }
-        let (low, high, count) = range(values, end);
-        let there = values.iter().filter(|value| **value == end).count();
-        let gap = (low - end).max(end - high);
-        if count > 0 && there > 1 && gap > high - low {
+    }
+}
+
+impl Ends {
+    /// Adds a number; NaN is passed over.
+    pub(crate) fn add(&mut self, number: f64) {
+        if number.is_nan() {
+            return;
+        }
+        let signed = [number, -number];
+        match &mut self.ends {
+            Some(ends) => ends
+                .iter_mut()
+                .zip(signed)
+                .for_each(|(end, n)| end.add(n, 1)),
+            None => {
+                self.ends = Some(signed.map(|number| End {
+                    number,
+                    count: 1,
+                    next: None,
+                }));
+            }
+        }
+    }
+
+    /// Adds the ends of other numbers.
+    pub(crate) fn join(&mut self, others: Self) {
+        let (Some(own), Some(others)) = (&mut self.ends, others.ends) else {
+            self.ends = self.ends.or(others.ends);
+            return;
+        };
+        for (own, other) in own.iter_mut().zip(others) {
+            own.add(other.number, other.count);
+            // It lies above that number, and so is no end however often it is there.
+            other.next.into_iter().for_each(|next| own.add(next, 1));
+        }
+    }
+
+    /// Refuses stored numbers of which one usual number for no data, several times there, lies further from all others than these
+    /// from each other.
+    pub(crate) fn check(&self, variable: &str) -> Result<(), Rejection> {
+        let Some([lowest, highest]) = self.ends else {
+            return Ok(());
+        };
+        for (is_turned, end, far) in [(false, lowest, highest), (true, highest, lowest)] {
+            let Some(next) = end.next.filter(|_| end.count > 1) else {
+                continue;
+            };
+            let as_it_is = |number: f64| if is_turned { -number } else { number };
+            let number = as_it_is(end.number);
+            let is_usual = USUAL
+                .iter()
+                .any(|usual| (number - usual).abs() <= SAME * usual.abs());
+            // The other end, seen from this one.
+            let far = -far.number;
+            if !is_usual || next - end.number <= far - next {
+                continue;
+            }
+            let (there, near, far) = (end.count, as_it_is(next), as_it_is(far));
+            let (low, high) = if is_turned { (far, near) } else { (near, far) };
             let detail = format!(
-                "has {there} cells of {end} and all others are {low} to {high}, but no _FillValue or missing_value says that it means no data; say fill_values = [{end}] in a profile, or [] if it is a value"
+                "has {there} cells of {number} and all others are {low} to {high}, but no _FillValue or missing_value says that it means no data; say fill_values = [{number}] in a profile, or [] if it is a value"
             );
             return Err(Rejection::new(RejectReason::Values, variable, detail));
         }
+        Ok(())
     }
-    Ok(())
-}
-
-/// Lowest and highest number but one, and how many there are.
-#[expect(clippy::float_cmp, reason = "one exact number is left out")]
-fn range(values: &[f64], without: f64) -> (f64, f64, usize) {
-    let others = values.iter().filter(|v| !v.is_nan() && **v != without);
-    others.fold(
-        (f64::INFINITY, f64::NEG_INFINITY, 0),
-        |(low, high, count), v| (low.min(*v), high.max(*v), count + 1),
-    )
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn ends(values: &[f64]) -> Ends {
+        let mut ends = Ends::default();
+        for value in values {
+            ends.add(*value);
+        }
+        ends
+    }
+
+    fn check(variable: &str, values: &[f64]) -> Result<(), Rejection> {
+        let whole = ends(values);
+        for at in 0..=values.len() {
+            let mut parts = ends(&values[..at]);
+            parts.join(ends(&values[at..]));
+            assert_eq!(parts, whole, "{values:?} in two parts");
+        }
+        whole.check(variable)
+    }
 
     #[test]
     fn a_number_for_no_data_that_nothing_marks_is_seen_by_its_distance() {

@@ -89,7 +89,7 @@ async fn a_refusal_is_told_at_once() {
 async fn only_what_is_named_by_its_content_is_sent_in_parts() {
     let faulty = Faulty::new([]);
     let store = store(&faulty);
-    let large = Bytes::from(vec![1; WHOLE_BYTES + 1]);
+    let large = Bytes::from(vec![1; WHOLE_BYTES as usize + 1]);
     let named = ObjectKey::raw(&"p".parse().unwrap(), &Digest::of(&large));
     assert!(store.put_new(&named, large.clone()).await.unwrap());
     assert!(!store.put_new(&named, large.clone()).await.unwrap());

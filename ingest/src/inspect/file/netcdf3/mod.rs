@@ -88,22 +88,17 @@ impl NetCdf3File {
             return Ok(());
         }
         let size_bytes = layout.external.size_bytes();
-        // Trailing dimensions taken whole make one run.
-        let whole = part.iter().rev().take_while(|p| **p == Part::All).count();
-        let outer = match layout.record_bytes {
-            Some(_) => (lens.len() - whole).max(1),
-            None => lens.len() - whole,
-        };
-        let run: u64 = lens[outer..].iter().product();
-        let mut index = vec![0u64; outer];
-        for (at, part) in index.iter_mut().zip(part) {
-            if let Part::At(fixed) = part {
-                *at = *fixed;
-            }
-        }
-        if index.iter().zip(lens).any(|(at, len)| at >= len) {
-            return Err(corrupt(name, "an index past its dimension"));
-        }
+        let past = || corrupt(name, "an index past its dimension");
+        let spans = part.iter().zip(lens).map(|(part, len)| part.span(*len));
+        let spans: Vec<(u64, u64)> = spans.collect::<Option<_>>().ok_or_else(past)?;
+        // Trailing dimensions taken whole make one run, with a part of the one before them; records lie apart.
+        let is_whole = |((_, count), len): &(&(u64, u64), &u64)| count == *len;
+        let pairs = spans.iter().zip(lens);
+        let whole = pairs.rev().take_while(is_whole).count();
+        let records = usize::from(layout.record_bytes.is_some());
+        let outer = (lens.len() - whole).saturating_sub(1).max(records);
+        let run: u64 = spans[outer..].iter().map(|(_, count)| count).product();
+        let mut index: Vec<u64> = spans.iter().take(outer + 1).map(|span| span.0).collect();
         loop {
             self.read_run(
                 name,
@@ -112,18 +107,14 @@ impl NetCdf3File {
                 run,
                 values,
             )?;
-            // The next index over the outer dimensions that are taken whole, slowest last.
-            let Some(next) = (0..outer)
-                .rev()
-                .find(|i| part[*i] == Part::All && index[*i] + 1 < lens[*i])
-            else {
+            // The next index over the outer dimensions, slowest last.
+            let has_next = |i: &usize| index[*i] + 1 < spans[*i].0 + spans[*i].1;
+            let Some(next) = (0..outer).rev().find(has_next) else {
                 return Ok(());
             };
             index[next] += 1;
             for i in next + 1..outer {
-                if part[i] == Part::All {
-                    index[i] = 0;
-                }
+                index[i] = spans[i].0;
             }
         }
     }

@@ -68,6 +68,13 @@ fn a_file_written_by_hand_reads_as_written() {
         [3.0, -6.0]
     );
     assert_eq!(file.read("v", &[Part::At(1), Part::At(0)]).unwrap(), [-4.0]);
+    let some = |first, count| Part::Some { first, count };
+    let rows = [some(0, 2), some(1, 1), Part::All].map(|part| file.read("v", &[part, some(1, 2)]));
+    let found = rows.map(Result::unwrap);
+    assert_eq!(found[0], [2.0, 3.0, -5.0, -6.0]);
+    assert_eq!((&found[1][..], &found[2]), (&[-5.0, -6.0][..], &found[0]));
+    assert!(file.read("v", &[Part::All, some(2, 2)]).is_err());
+    assert!(file.read("v", &[some(1, u64::MAX), Part::All]).is_err());
     assert_eq!(file.read("s", &[Part::All]).unwrap(), [2.5]);
     assert!(file.read("v", &[Part::At(2), Part::All]).is_err());
     assert!(file.read("v", &[Part::All]).is_err() && file.read("w", &[]).is_err());
