@@ -11,6 +11,27 @@ use crate::{Bands, CubeError, LevelWindow};
 /// Values of a field that are held at a time, about.
 const BAND_CELLS: u32 = 1 << 24;
 
+/// Smallest and largest value of a field, 0 and 0 without data; it is read a band at a time.
+///
+/// # Errors
+/// Whatever `bands` fail with.
+pub async fn range_of_field(grid: &Grid, bands: &mut dyn Bands) -> Result<[f32; 2], CubeError> {
+    let at_once = (BAND_CELLS / grid.cols).max(1);
+    let mut range: Option<[f32; 2]> = None;
+    let mut next = 0;
+    while next < grid.rows {
+        let rows = next..grid.rows.min(next.saturating_add(at_once));
+        next = rows.end;
+        for value in bands.rows(rows).await? {
+            if value.is_finite() {
+                let [least, most] = range.unwrap_or([value; 2]);
+                range = Some([least.min(value), most.max(value)]);
+            }
+        }
+    }
+    Ok(range.unwrap_or_default())
+}
+
 /// A window of a level of a field, by the level's number, from 1 on. The rows below it are read, of all columns, a band at a time.
 ///
 /// # Errors

@@ -127,9 +127,9 @@ impl Levels {
                 plain::write_fixed(store, arrays::level_fixed(description, &level)?).await?;
             }
             let values = arrays::level_values(description, &level, steps as u64)?;
-            describe(store, values).await?;
+            describe(store, &values).await?;
             let coverage = arrays::level_coverage(description, &level, steps as u64)?;
-            describe(store, coverage).await?;
+            describe(store, &coverage).await?;
         }
         Ok(())
     }
@@ -161,8 +161,8 @@ impl Levels {
         for level in level::levels(&description.grid) {
             let copies = arrays::level_axis(&level, description.quantity, steps as u64)?;
             for (from, to) in [&own.time, &own.bounds].into_iter().zip(copies) {
+                describe(store, &to).await?;
                 refer(session, from, &to, first_step..steps).await?;
-                describe(store, to).await?;
             }
         }
         Ok(())
@@ -198,7 +198,7 @@ impl Levels {
 }
 
 /// Writes what an array is like.
-async fn describe(store: &Arc<AsyncIcechunkStore>, array: Definition) -> Result<(), CubeError> {
+async fn describe(store: &Arc<AsyncIcechunkStore>, array: &Definition) -> Result<(), CubeError> {
     let array = array.with_storage(Arc::clone(store));
     let stored = array.async_store_metadata().await;
     stored.map_err(|e| CubeError::library(&arrays::name(&array), "writing", e))

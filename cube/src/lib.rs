@@ -61,7 +61,7 @@ pub use encoded_sums::EncodedSums;
 pub use error::CubeError;
 pub use field_bands::FieldBands;
 pub use follow::{Followed, Follower, folder, follow, keep_up};
-pub use joined::joined_window;
+pub use joined::{joined_window, range_of_field};
 pub use joining::WHOLLY_COVERED;
 pub use keys::Keys;
 pub use layout::{BLOCK_CELLS, Layout, RUN_STEPS};

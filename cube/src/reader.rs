@@ -64,7 +64,8 @@ pub struct LevelWindow {
 }
 
 impl LevelWindow {
-    pub(crate) fn of_cells(values: Vec<f32>) -> Self {
+    /// That of cells of the values themselves, which have data or have none.
+    pub fn of_cells(values: Vec<f32>) -> Self {
         let coverage = |value: &f32| if value.is_nan() { 0 } else { WHOLLY_COVERED };
         Self {
             coverage: values.iter().map(coverage).collect(),

@@ -133,6 +133,21 @@ impl Field {
         Self::new(filled.values).with_errors(filled.errors)
     }
 
+    /// The same as a part of a field whose values lie in a range: slices and light are laid out for all of it.
+    #[must_use]
+    pub fn over(mut self, range: [f32; 2]) -> Self {
+        self.range = range;
+        self
+    }
+
+    /// The same with estimated errors of its values, as a part of a field whose largest one is known.
+    #[must_use]
+    pub fn with_errors_of(self, errors: Vec<f32>, largest_error: f32) -> Self {
+        let mut own = self.with_errors(errors);
+        own.largest_error = largest_error;
+        own
+    }
+
     fn with_errors(mut self, errors: Vec<f32>) -> Self {
         let errors = Self::new(errors);
         self.largest_error = errors.range[1];
@@ -264,9 +279,52 @@ pub struct Scene {
     pub northward: Option<Interval>,
     /// What the trails on the sea surface are drawn from: a flow on a grid of its own.
     pub trails: Option<Arc<Scene>>,
+    /// What the grid is a window of; none if it is all that the product has.
+    pub whole: Option<Whole>,
+}
+
+/// A grid that is too large to be held, and where a window of it begins. What must not depend on the window goes by it: random
+/// numbers, which blocks of cells are joined, and where a region ends.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Whole {
+    /// All of it.
+    pub grid: Grid,
+    /// First row of the window.
+    pub row: u32,
+    /// Its first column; the window may go on beyond the last one where the grid goes all the way round.
+    pub col: u32,
 }
 
 impl Scene {
+    /// A grid without content whose accumulated carbon lies in a range, to plan pictures of before anything is read.
+    pub(crate) fn unread(grid: Grid, carbon: Option<[f32; 2]>, whole: Option<Whole>) -> Self {
+        let still = |range| {
+            let field = Arc::new(Field::new(vec![]).over(range));
+            Interval {
+                before: Arc::clone(&field),
+                after: field,
+                weight: 0.0,
+            }
+        };
+        Self {
+            grid,
+            domain: Self::domain_of([]),
+            value: still([0.0; 2]),
+            accumulated: carbon.map(still),
+            terrain: None,
+            northward: None,
+            trails: None,
+            whole,
+        }
+    }
+
+    /// A domain of blocks of cells from how much of each holds data, of [`COVERED`].
+    pub fn domain_of_blocks(shares: Vec<u32>) -> Arc<Cells<u32>> {
+        let mut cells = Cells::new(shares);
+        cells.is_joined = true;
+        Arc::new(cells)
+    }
+
     /// A domain from one flag a cell.
     pub fn domain_of(cells: impl IntoIterator<Item = bool>) -> Arc<Cells<u32>> {
         let covered = |holds_data: bool| u32::from(holds_data) * COVERED;
