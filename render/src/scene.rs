@@ -73,6 +73,8 @@ pub struct Field {
     pub largest_error: f32,
     /// Smallest and largest value, 0 and 0 without data.
     pub range: [f32; 2],
+    /// Is it a part of a field, whose range and largest error these are?
+    is_part: bool,
     /// Means over blocks of four.
     coarser_mean: OnceLock<Arc<Field>>,
     /// What keeps the mass of blocks of four.
@@ -105,6 +107,7 @@ impl Field {
             errors: None,
             largest_error: 0.0,
             range: range.unwrap_or_default(),
+            is_part: false,
             coarser_mean: OnceLock::new(),
             coarser_mass: OnceLock::new(),
             lacking: None,
@@ -137,6 +140,17 @@ impl Field {
     #[must_use]
     pub fn over(mut self, range: [f32; 2]) -> Self {
         self.range = range;
+        self.is_part = true;
+        self
+    }
+
+    /// The same in coarser cells, as a part of the same field.
+    fn of_the_same(mut self, finer: &Self) -> Self {
+        if finer.is_part {
+            self.range = finer.range;
+            self.largest_error = finer.largest_error;
+            self.is_part = true;
+        }
         self
     }
 
@@ -145,6 +159,7 @@ impl Field {
     pub fn with_errors_of(self, errors: Vec<f32>, largest_error: f32) -> Self {
         let mut own = self.with_errors(errors);
         own.largest_error = largest_error;
+        own.is_part = true;
         own
     }
 
@@ -193,13 +208,13 @@ impl Field {
             if let Some(lacking) = &self.lacking {
                 coarser = coarser.with_lacking(make(lacking));
             }
-            Arc::new(coarser)
+            Arc::new(coarser.of_the_same(self))
         };
         Arc::clone(self.coarser_mean.get_or_init(coarser))
     }
 
     pub(crate) fn coarser_mass(&self, make: impl FnOnce(&[f32]) -> Vec<f32>) -> Arc<Self> {
-        let coarser = || Arc::new(Self::new(make(&self.cells.content)));
+        let coarser = || Arc::new(Self::new(make(&self.cells.content)).of_the_same(self));
         Arc::clone(self.coarser_mass.get_or_init(coarser))
     }
 

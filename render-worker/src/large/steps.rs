@@ -6,6 +6,7 @@ use contract::grid::Grid;
 use contract::key::ObjectKey;
 use contract::kind::Vouched;
 use contract::quantity::Quantity;
+use cube::Bands as _;
 use cube::{
     At, Cube, CubeError, FieldBands, LevelWindow, Repository, joined_window, range_of_field,
 };
