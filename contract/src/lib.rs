@@ -30,6 +30,7 @@ pub mod job;
 pub mod key;
 pub mod kind;
 pub mod land;
+pub mod level;
 pub mod listing;
 pub mod look_at;
 pub mod manifest;

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use contract::grid::Grid;
+use contract::level::Level;
 use contract::quantity::Quantity;
 use serde_json::{Map, Value, json};
 use zarrs::array::codec::{BytesCodec, Crc32cCodec, ZstdCodec};
@@ -20,6 +21,8 @@ use crate::{CubeError, Description, Layout, cf};
 pub(crate) const SERIES: &str = "series";
 /// Group of sums of blocks.
 pub(crate) const SUMS: &str = "sums";
+/// Group of coarser levels.
+pub(crate) const LEVELS: &str = "levels";
 /// Steps in a chunk of the time coordinate.
 pub(crate) const TIME_CHUNK: u64 = 1024;
 /// Steps in a chunk of digests, which do not compress.
@@ -102,6 +105,67 @@ pub(crate) fn sums(description: &Description, runs: usize) -> Result<Definition,
     define(&shape, uint8(), 0u8.into(), Map::new(), inner)
 }
 
+/// Folder of a level.
+pub(crate) fn level_group(level: &Level) -> String {
+    format!("{LEVELS}/{}", level.number)
+}
+
+/// Values of a level, `[time, lat, lon]`, stored unit, NaN no data.
+pub(crate) fn level_values(
+    description: &Description,
+    level: &Level,
+    steps: u64,
+) -> Result<Definition, CubeError> {
+    let (shape, inner) = level_shape(level, &cf::variable(description.quantity), steps);
+    let attributes = cf::of_level_values(description);
+    define(&shape, float32(), f32::NAN.into(), attributes, inner)
+}
+
+/// How much of each cell of a level holds data, `[time, lat, lon]`.
+pub(crate) fn level_coverage(
+    description: &Description,
+    level: &Level,
+    steps: u64,
+) -> Result<Definition, CubeError> {
+    let (shape, inner) = level_shape(level, &cf::coverage(description.quantity), steps);
+    define(&shape, uint8(), 0u8.into(), cf::of_coverage(), inner)
+}
+
+fn level_shape(level: &Level, name: &str, steps: u64) -> (Shape, Option<Vec<u64>>) {
+    let (grid, layout) = (&level.grid, Layout::of_level(&level.grid));
+    let along_time = |[rows, cols]: [u32; 2]| vec![1, rows.into(), cols.into()];
+    let shape = Shape {
+        name: format!("{}/{name}", level_group(level)),
+        cells: vec![steps, grid.rows.into(), grid.cols.into()],
+        chunk: along_time(layout.object),
+        dimensions: &["time", "lat", "lon"],
+    };
+    let inner = layout.is_sharded().then(|| along_time(layout.chunk));
+    (shape, inner)
+}
+
+/// Of each step the digest of the values that its levels were made of, `[time, byte]`; zeros where they are not there.
+pub(crate) fn level_names(steps: usize) -> Result<Definition, CubeError> {
+    let shape = Shape {
+        name: format!("{LEVELS}/steps_sha256"),
+        cells: vec![steps as u64, DIGEST_BYTES],
+        chunk: vec![DIGEST_CHUNK, DIGEST_BYTES],
+        dimensions: &["time", "sha256_byte"],
+    };
+    define(&shape, uint8(), 0u8.into(), cf::of_level_names(), None)
+}
+
+/// Of each step the smallest and the largest of the values that its levels were made of, `[time, 2]`.
+pub(crate) fn level_ranges(steps: usize) -> Result<Definition, CubeError> {
+    let shape = Shape {
+        name: format!("{LEVELS}/range"),
+        cells: vec![steps as u64, 2],
+        chunk: vec![TIME_CHUNK, 2],
+        dimensions: &["time", "least_most"],
+    };
+    define(&shape, float32(), 0f32.into(), cf::of_ranges(), None)
+}
+
 /// What a cell of each row of a grid weighs in sums, `[row]`.
 pub(crate) fn row_weights(grid: &Grid) -> Result<Definition, CubeError> {
     let shape = Shape {
@@ -161,9 +225,23 @@ impl Axis {
 
 /// The arrays along time for a number of steps.
 pub(crate) fn axis(quantity: Quantity, steps: u64) -> Result<Axis, CubeError> {
+    axis_in("", quantity, steps)
+}
+
+/// Those that a level has too: where a step's value holds, and its bounds.
+pub(crate) fn level_axis(
+    level: &Level,
+    quantity: Quantity,
+    steps: u64,
+) -> Result<[Definition; 2], CubeError> {
+    let axis = axis_in(&format!("{}/", level_group(level)), quantity, steps)?;
+    Ok([axis.time, axis.bounds])
+}
+
+fn axis_in(folder: &str, quantity: Quantity, steps: u64) -> Result<Axis, CubeError> {
     let instants = |name: &str, attributes| {
         let shape = Shape {
-            name: name.to_owned(),
+            name: format!("{folder}{name}"),
             cells: vec![steps],
             chunk: vec![TIME_CHUNK],
             dimensions: &["time"],
@@ -171,13 +249,13 @@ pub(crate) fn axis(quantity: Quantity, steps: u64) -> Result<Axis, CubeError> {
         define(&shape, int64(), 0i64.into(), attributes, None)
     };
     let bounds = Shape {
-        name: "time_bnds".to_owned(),
+        name: format!("{folder}time_bnds"),
         cells: vec![steps, 2],
         chunk: vec![TIME_CHUNK, 2],
         dimensions: &["time", "bnds"],
     };
     let digests = Shape {
-        name: "values_sha256".to_owned(),
+        name: format!("{folder}values_sha256"),
         cells: vec![steps, DIGEST_BYTES],
         chunk: vec![DIGEST_CHUNK, DIGEST_BYTES],
         dimensions: &["time", "sha256_byte"],
@@ -201,18 +279,37 @@ pub(crate) enum Fixed {
 
 /// Latitudes, longitudes, their bounds and the grid mapping.
 pub(crate) fn fixed(description: &Description) -> Result<Vec<Fixed>, CubeError> {
-    let (lat, lon) = places(&description.grid);
+    fixed_in("", places(&description.grid))
+}
+
+/// The same of a level.
+pub(crate) fn level_fixed(
+    description: &Description,
+    level: &Level,
+) -> Result<Vec<Fixed>, CubeError> {
+    let grid = &description.grid;
+    let rows = level.row_edges(grid);
+    let cols = level.col_edges(grid);
+    let places = (
+        Places::between(&rows, &|row| grid.row_north_deg(row)),
+        Places::between(&cols, &|col| grid.col_west_deg(col)),
+    );
+    fixed_in(&format!("{}/", level_group(level)), places)
+}
+
+fn fixed_in(folder: &str, (lat, lon): (Places, Places)) -> Result<Vec<Fixed>, CubeError> {
     let crs = Shape {
-        name: "crs".to_owned(),
+        name: format!("{folder}crs"),
         cells: vec![],
         chunk: vec![],
         dimensions: &[],
     };
+    let named = |name: &str| format!("{folder}{name}");
     Ok(vec![
-        floats("lat", &["lat"], cf::of_lat(), lat.centres)?,
-        floats("lat_bnds", &["lat", "bnds"], Map::new(), lat.bounds)?,
-        floats("lon", &["lon"], cf::of_lon(), lon.centres)?,
-        floats("lon_bnds", &["lon", "bnds"], Map::new(), lon.bounds)?,
+        floats(named("lat"), &["lat"], cf::of_lat(), lat.centres)?,
+        floats(named("lat_bnds"), &["lat", "bnds"], Map::new(), lat.bounds)?,
+        floats(named("lon"), &["lon"], cf::of_lon(), lon.centres)?,
+        floats(named("lon_bnds"), &["lon", "bnds"], Map::new(), lon.bounds)?,
         Fixed::Number(define(&crs, int32(), 0i32.into(), cf::of_crs(), None)?, 0),
     ])
 }
@@ -225,27 +322,29 @@ pub struct Places {
     pub bounds: Vec<f64>,
 }
 
+impl Places {
+    /// Cells between edges, whose places are told by their numbers.
+    fn between(edges: &[u32], deg: &dyn Fn(u32) -> f64) -> Self {
+        let pairs = edges.windows(2).map(|pair| [deg(pair[0]), deg(pair[1])]);
+        let centre = |[from, to]: [f64; 2]| contract::grid::rounded_deg(0.5 * (from + to));
+        Self {
+            centres: pairs.clone().map(centre).collect(),
+            bounds: pairs.flatten().map(contract::grid::rounded_deg).collect(),
+        }
+    }
+}
+
 /// Latitudes north to south and longitudes eastwards, past 180 where the grid crosses the date line.
 pub fn places(grid: &Grid) -> (Places, Places) {
-    let of = |count: u32, edge: &dyn Fn(u32) -> f64| {
-        let edges = |cell: u32| [edge(cell), edge(cell + 1)];
-        let centre = |[from, to]: [f64; 2]| contract::grid::rounded_deg(0.5 * (from + to));
-        Places {
-            centres: (0..count).map(|cell| centre(edges(cell))).collect(),
-            bounds: (0..count)
-                .flat_map(edges)
-                .map(contract::grid::rounded_deg)
-                .collect(),
-        }
-    };
+    let edges = |count: u32| (0..=count).collect::<Vec<_>>();
     (
-        of(grid.rows, &|row| grid.row_north_deg(row)),
-        of(grid.cols, &|col| grid.col_west_deg(col)),
+        Places::between(&edges(grid.rows), &|row| grid.row_north_deg(row)),
+        Places::between(&edges(grid.cols), &|col| grid.col_west_deg(col)),
     )
 }
 
 fn floats(
-    name: &str,
+    name: String,
     dimensions: &'static [&'static str],
     attributes: Map<String, Value>,
     values: Vec<f64>,
@@ -255,7 +354,7 @@ fn floats(
         _ => vec![values.len() as u64 / 2, 2],
     };
     let shape = Shape {
-        name: name.to_owned(),
+        name,
         chunk: cells.clone(),
         cells,
         dimensions,

@@ -114,6 +114,31 @@ impl<S: AsyncWritableStorageTraits + 'static> Writer<'_, S> {
     }
 }
 
+/// Writes numbers along time from step `first` on: `numbers` are those of all steps, `each` a step.
+pub(crate) async fn write_numbers<S>(
+    store: &Arc<S>,
+    definition: &Definition,
+    (numbers, each): (&[f32], usize),
+    first: usize,
+) -> Result<(), CubeError>
+where
+    S: AsyncWritableStorageTraits + 'static,
+{
+    let array = definition.with_storage(Arc::clone(store));
+    let failed = |e: String| CubeError::library(&arrays::name(&array), "writing", e);
+    let stored = array.async_store_metadata().await;
+    stored.map_err(|e| failed(e.to_string()))?;
+    let steps = chunk_steps(definition)?;
+    let chunks = numbers.chunks(steps * each).enumerate();
+    for (chunk, numbers) in chunks.skip(first / steps) {
+        let mut numbers = numbers.to_vec();
+        numbers.resize(steps * each, 0.0);
+        let stored = array.async_store_chunk(&[chunk as u64, 0], numbers).await;
+        stored.map_err(|e| failed(e.to_string()))?;
+    }
+    Ok(())
+}
+
 /// Reads all steps.
 ///
 /// # Errors
@@ -163,7 +188,7 @@ where
     Ok(steps)
 }
 
-async fn read_array<S, T>(
+pub(crate) async fn read_array<S, T>(
     store: &Arc<S>,
     definition: &Definition,
     place: &str,

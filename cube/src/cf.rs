@@ -5,6 +5,8 @@ use contract::quantity::Quantity;
 use serde_json::{Map, Value, json};
 
 use crate::Description;
+use crate::joining::{Method, WHOLLY_COVERED};
+use crate::rounding::KEPT_BITS;
 
 /// Unit of the time coordinate; instants are whole milliseconds, so that no time is rounded.
 pub(crate) const TIME_UNITS: &str = "milliseconds since 1970-01-01 00:00:00";
@@ -108,6 +110,65 @@ pub fn of_values(description: &Description) -> Map<String, Value> {
         attributes.insert("comment".to_owned(), comment.into());
     }
     attributes
+}
+
+/// Name of the variable that tells how much of a cell of a level holds data.
+pub(crate) fn coverage(quantity: Quantity) -> String {
+    const NAME: &str = "coverage";
+    match variable(quantity) {
+        name if name == NAME => format!("{NAME}_of_cells"),
+        _ => NAME.to_owned(),
+    }
+}
+
+/// Of the values of a level.
+pub(crate) fn of_level_values(description: &Description) -> Map<String, Value> {
+    let mut attributes = of_values(description);
+    let quantity = description.quantity;
+    let comment = match Method::of(quantity) {
+        Method::Mean => "means by area over the cells that hold data",
+        Method::Direction { .. } => {
+            "where the mean of unit vectors by area points, over the cells that hold data; none where they cancel"
+        }
+        Method::Sample => {
+            "the value of one cell of the block, that of its middle where it holds data: codes have no mean"
+        }
+    };
+    let rounded = match Method::of(quantity) {
+        Method::Sample => String::new(),
+        _ => format!(
+            "; rounded to {KEPT_BITS} bits behind the leading one, which is 2^-16 of a value at most"
+        ),
+    };
+    attributes.insert("comment".to_owned(), format!("{comment}{rounded}").into());
+    if Method::of(quantity) != Method::Sample {
+        attributes.insert("quantization_nsb".to_owned(), KEPT_BITS.into());
+    }
+    attributes.insert("ancillary_variables".to_owned(), coverage(quantity).into());
+    attributes
+}
+
+/// Of how much of each cell of a level holds data.
+pub(crate) fn of_coverage() -> Map<String, Value> {
+    attributes(
+        json!({ "long_name": "share of the area of the cell that holds data", "units": "1",
+        "scale_factor": 1.0 / f64::from(WHOLLY_COVERED), "add_offset": 0.0, "grid_mapping": "crs",
+        "comment": "0 where there is no data at all, the largest number where there is data everywhere" }),
+    )
+}
+
+/// Of what the levels of steps were made of.
+pub(crate) fn of_level_names() -> Map<String, Value> {
+    attributes(
+        json!({ "long_name": "SHA-256 of the values that the levels of a step were made of" }),
+    )
+}
+
+/// Of the smallest and largest values of steps.
+pub(crate) fn of_ranges() -> Map<String, Value> {
+    attributes(
+        json!({ "long_name": "smallest and largest value of a step, zeros where it has no data" }),
+    )
 }
 
 /// Of the time-major copy of the values.

@@ -26,7 +26,7 @@ use crate::layout::RUN_STEPS;
 use crate::series;
 use crate::state::State;
 use crate::sums::Basis;
-use crate::{At, Cube, CubeError, Repository};
+use crate::{At, Cube, CubeError, Repository, complete};
 
 /// Steps whose windows are read before they are turned: 16 values side by side fill a line of a processor's cache.
 const STEPS_AT_ONCE: usize = 16;
@@ -44,7 +44,7 @@ struct Made {
 }
 
 /// Makes the runs of the cube in a folder of a store that are not there yet, and sums of them, the last one if it lacks many
-/// steps; how many that were.
+/// steps; how many that were. Steps that have no levels get them.
 ///
 /// # Errors
 /// `Missing` if there is no cube. A chunk that is damaged or gone: no run is made of it.
@@ -55,7 +55,7 @@ pub fn compact<'a>(store: &'a Store, folder: &'a str) -> BoxFuture<'a, Result<us
         loop {
             let cube = repository.at(&At::Newest).await?;
             let Some(run) = cube.first_missing() else {
-                return Ok(made);
+                break;
             };
             let compaction = Compaction {
                 repository: &repository,
@@ -68,6 +68,8 @@ pub fn compact<'a>(store: &'a Store, folder: &'a str) -> BoxFuture<'a, Result<us
             let shards = compaction.shards().await?;
             made += usize::from(compaction.place(&shards).await?);
         }
+        complete::complete(store, folder).await?;
+        Ok(made)
     })
 }
 

@@ -6,21 +6,20 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use contract::digest::Digest;
 use contract::time::Period;
 use futures::future::BoxFuture;
-use futures::stream::{StreamExt as _, TryStreamExt as _};
-use icechunk::format::manifest::ChunkPayload;
-use icechunk::format::{ChunkIndices, Path};
-use icechunk::session::{Session, SessionError};
+use icechunk::session::Session;
 use tokio::sync::RwLock;
 
-use crate::field::{EncodedObject, Encoder};
+use crate::bands::{Bands, WholeField};
 use crate::layer::Layer;
-use crate::plain::{self, OBJECTS_AT_ONCE};
+use crate::parts::{Parts, Sent};
+use crate::plain;
 use crate::plan::Plan;
 use crate::staged::{AllStaged, Staged};
 use crate::state::State;
-use crate::{CubeError, Description, Repository, Step, cf};
+use crate::{CubeError, Description, Repository, Step};
 
 /// How often a commit is laid on top of those of others.
 pub(crate) const ATTEMPTS: u32 = 50;
@@ -32,8 +31,7 @@ pub struct Edit<'a> {
     description: Description,
     /// Sends chunks; what it knows of the newest state may be old by the time of the commit.
     uploads: Arc<RwLock<Session>>,
-    encoder: Arc<Encoder>,
-    path: Path,
+    parts: Parts,
     staged: AllStaged,
 }
 
@@ -59,13 +57,10 @@ impl<'a> Edit<'a> {
         repository: &'a Repository,
         description: Description,
     ) -> Result<Self, CubeError> {
-        let variable = cf::variable(description.quantity);
-        let path = Path::new(&format!("/{variable}"));
         Ok(Self {
             repository,
             uploads: repository.session().await?,
-            encoder: Arc::new(Encoder::new(&description)?),
-            path: path.map_err(|e| repository.failed("naming the values", &e))?,
+            parts: Parts::new(&description)?,
             description,
             staged: BTreeMap::new(),
         })
@@ -90,44 +85,45 @@ impl<'a> Edit<'a> {
                 values_sha256: digested
                     .map_err(|e| self.repository.failed("naming the values", &e))?,
             };
-            let staged = self.send(step, &values).await?;
+            let mut bands = WholeField::new(values, grid.cols);
+            let staged = self.send(step, &mut bands).await?;
+            self.stage(staged);
+            Ok(step)
+        })
+    }
+
+    /// The same of a field that comes in bands of rows and is not held whole: a row of objects at a time, 144 MB of 18,000 x 36,000
+    /// cells. `values_sha256` is the digest of its values and period, [`storage::fields::digest_of`], which is not compared here.
+    pub fn put_bands<'b>(
+        &'b mut self,
+        period: Period,
+        values_sha256: Digest,
+        bands: &'b mut dyn Bands,
+    ) -> BoxFuture<'b, Result<Step, CubeError>> {
+        Box::pin(async move {
+            let step = Step {
+                period,
+                values_sha256,
+            };
+            let staged = self.send(step, bands).await?;
             self.stage(staged);
             Ok(step)
         })
     }
 
     /// Sends the values of a step whose digest is known. Several may be on the way at once.
-    pub(crate) async fn send(&self, step: Step, values: &Arc<[f32]>) -> Result<Staged, CubeError> {
-        plain::check_length(values, self.description.grid.cell_count())?;
-        let objects: Vec<_> = plain::encoded(&self.encoder, values)
-            .map(|object| self.upload(object))
-            .buffer_unordered(OBJECTS_AT_ONCE)
-            .try_collect()
-            .await?;
-        Ok(Staged { step, objects })
+    pub(crate) async fn send(
+        &self,
+        step: Step,
+        bands: &mut dyn Bands,
+    ) -> Result<Staged, CubeError> {
+        let sent = self.parts.send(&self.uploads, bands, Sent::All).await?;
+        Ok(Staged { step, sent })
     }
 
     /// Takes a step that was sent into the change.
     pub(crate) fn stage(&mut self, staged: Staged) {
         self.staged.insert(staged.step.period.start, staged);
-    }
-
-    async fn upload(
-        &self,
-        object: Result<EncodedObject, CubeError>,
-    ) -> Result<([u32; 2], Option<ChunkPayload>), CubeError> {
-        let EncodedObject { index, content } = object?;
-        let Some(content) = content else {
-            return Ok((index, None));
-        };
-        let [row, col] = index;
-        let session = self.uploads.read().await;
-        // The place in time is not known yet; it is part of the request's label only.
-        let writer = session.get_chunk_writer(&self.path, &ChunkIndices(vec![0, row, col]));
-        drop(session);
-        let failed = |e: SessionError| self.repository.failed("storing a chunk", &e);
-        let payload = writer.map_err(failed)?(content).await.map_err(failed)?;
-        Ok((index, Some(payload)))
     }
 
     /// Commits all that was put, whole or not at all: what was there before stays beside it.
@@ -184,8 +180,7 @@ impl<'a> Edit<'a> {
         Layer {
             repository: self.repository,
             description: &self.description,
-            indices: self.encoder.indices(),
-            path: &self.path,
+            parts: &self.parts,
             state,
             plan,
             staged: &self.staged,

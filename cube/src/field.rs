@@ -1,13 +1,16 @@
 //! One step's values as encoded objects, and one encoded chunk as values.
 
 use std::borrow::Cow;
+use std::marker::PhantomData;
 use std::num::NonZeroU64;
+use std::ops::Range;
 
 use bytes::Bytes;
 use contract::chunk::Window;
 use contract::grid::Grid;
 use zarrs::array::{
-    ArrayToBytesCodecTraits as _, CodecChain, CodecOptions, Element, FromArrayBytes as _,
+    ArrayToBytesCodecTraits as _, CodecChain, CodecOptions, Element, ElementOwned,
+    FromArrayBytes as _,
 };
 
 use crate::arrays::{self, Definition};
@@ -16,11 +19,37 @@ use crate::summing::records;
 use crate::sums::Basis;
 use crate::{CubeError, Description, Layout};
 
-/// Writes fields of one grid as objects of the layout.
-pub(crate) struct Encoder {
+/// A number of map-major arrays.
+pub(crate) trait Number: Element + ElementOwned + Copy + Send + Sync + 'static {
+    /// What stands where there is no data: an object of nothing else is not stored.
+    const BLANK: Self;
+
+    fn is_blank(self) -> bool;
+}
+
+impl Number for f32 {
+    const BLANK: Self = f32::NAN;
+
+    fn is_blank(self) -> bool {
+        self.is_nan()
+    }
+}
+
+impl Number for u8 {
+    const BLANK: Self = 0;
+
+    fn is_blank(self) -> bool {
+        self == 0
+    }
+}
+
+/// Writes bands of a map-major array as objects of its layout.
+pub(crate) struct Encoder<T> {
     definition: Definition,
-    grid: Grid,
+    /// Rows and columns of the grid.
+    cells: [u32; 2],
     layout: Layout,
+    number: PhantomData<T>,
 }
 
 /// An object of a field: a chunk, or a shard of chunks.
@@ -31,42 +60,77 @@ pub(crate) struct EncodedObject {
     pub(crate) content: Option<Bytes>,
 }
 
-impl Encoder {
+impl Encoder<f32> {
+    /// Of fields.
     pub(crate) fn new(description: &Description) -> Result<Self, CubeError> {
-        Ok(Self {
-            definition: arrays::values(description, 1)?,
-            grid: description.grid,
-            layout: Layout::of(&description.grid),
-        })
+        let grid = &description.grid;
+        let definition = arrays::values(description, 1)?;
+        Ok(Self::of(definition, grid, Layout::of(grid)))
+    }
+}
+
+impl<T: Number> Encoder<T> {
+    /// Of an array over a grid.
+    pub(crate) fn of(definition: Definition, grid: &Grid, layout: Layout) -> Self {
+        Self {
+            definition,
+            cells: [grid.rows, grid.cols],
+            layout,
+            number: PhantomData,
+        }
     }
 
-    /// Rows and columns of all objects of a field.
+    /// Path of the array.
+    pub(crate) fn path(&self) -> &str {
+        self.definition.path().as_str()
+    }
+
+    /// Columns of the grid.
+    pub(crate) fn cols(&self) -> usize {
+        self.cells[1] as usize
+    }
+
+    /// Rows and columns of objects.
+    fn objects(&self) -> [u32; 2] {
+        [0, 1].map(|side| self.cells[side].div_ceil(self.layout.object[side]))
+    }
+
+    /// Rows and columns of all objects.
     pub(crate) fn indices(&self) -> Vec<[u32; 2]> {
-        let [rows, cols] = self.layout.objects(&self.grid);
-        (0..rows)
-            .flat_map(|row| (0..cols).map(move |col| [row, col]))
-            .collect()
+        let [rows, _] = self.objects();
+        (0..rows).flat_map(|row| self.indices_in(row)).collect()
     }
 
-    /// Encodes one object of a field of `values`, `[row, col]`.
-    pub(crate) fn encode(
-        &self,
-        values: &[f32],
-        index: [u32; 2],
-    ) -> Result<EncodedObject, CubeError> {
+    /// Those of a row of objects.
+    pub(crate) fn indices_in(&self, row: u32) -> impl Iterator<Item = [u32; 2]> + use<T> {
+        let [_, cols] = self.objects();
+        (0..cols).map(move |col| [row, col])
+    }
+
+    /// The bands of rows that rows of objects hold.
+    pub(crate) fn bands(&self) -> impl Iterator<Item = Range<u32>> + use<T> {
+        let ([rows, _], height) = (self.cells, self.layout.object[0]);
+        let bands = 0..rows.div_ceil(height);
+        bands.map(move |band| band * height..((band + 1) * height).min(rows))
+    }
+
+    /// Encodes one object from the band of rows that its row of objects holds, `[row, col]` of all columns.
+    pub(crate) fn encode(&self, band: &[T], index: [u32; 2]) -> Result<EncodedObject, CubeError> {
         let [rows, cols] = self.layout.object.map(|cells| cells as usize);
-        let (grid_rows, grid_cols) = (self.grid.rows as usize, self.grid.cols as usize);
-        let (row, col) = (index[0] as usize * rows, index[1] as usize * cols);
+        let grid_cols = self.cells[1] as usize;
+        let col = index[1] as usize * cols;
         let width = cols.min(grid_cols - col);
-        let mut cells = vec![f32::NAN; rows * cols];
-        for (to, from) in cells.chunks_exact_mut(cols).zip(row..grid_rows) {
-            let from = &values[from * grid_cols + col..][..width];
-            for (to, value) in to.iter_mut().zip(from) {
+        let mut cells = vec![T::BLANK; rows * cols];
+        for (to, from) in cells
+            .chunks_exact_mut(cols)
+            .zip(band.chunks_exact(grid_cols))
+        {
+            for (to, value) in to.iter_mut().zip(&from[col..][..width]) {
                 // "No data" is one bit pattern, the fill value's.
-                *to = if value.is_nan() { f32::NAN } else { *value };
+                *to = if value.is_blank() { T::BLANK } else { *value };
             }
         }
-        if cells.iter().all(|value| value.is_nan()) {
+        if cells.iter().all(|value| value.is_blank()) {
             return Ok(EncodedObject {
                 index,
                 content: None,
@@ -170,29 +234,30 @@ impl SeriesEncoder {
     }
 }
 
-/// Reads chunks of one grid.
-pub(crate) struct Decoder {
+/// Reads chunks of one map-major array.
+pub(crate) struct Decoder<T> {
     definition: Definition,
     codecs: CodecChain,
     shape: Vec<NonZeroU64>,
+    number: PhantomData<T>,
 }
 
-impl Decoder {
-    /// Of map-major chunks, `[row, col]`.
-    pub(crate) fn new(description: &Description) -> Result<Self, CubeError> {
-        let chunk = Layout::of(&description.grid).chunk;
-        let shape = [1, chunk[0].into(), chunk[1].into()];
+impl<T: Number> Decoder<T> {
+    /// Of an array that is cut so.
+    pub(crate) fn new(definition: Definition, layout: &Layout) -> Self {
+        let shape = [1, layout.chunk[0].into(), layout.chunk[1].into()];
         let side = |cells: u64| NonZeroU64::new(cells).unwrap_or(NonZeroU64::MIN);
-        Ok(Self {
-            definition: arrays::values(description, 1)?,
+        Self {
+            definition,
             codecs: arrays::chunk_codecs(),
             shape: shape.map(side).to_vec(),
-        })
+            number: PhantomData,
+        }
     }
 
-    /// Values of a whole chunk. Its checksum is compared with its bytes before anything else: the library
+    /// Numbers of a whole chunk, `[row, col]`. Its checksum is compared with its bytes before anything else: the library
     /// does not do that where it decodes a part of a chunk.
-    pub(crate) fn decode(&self, content: Vec<u8>) -> Result<Vec<f32>, String> {
+    pub(crate) fn decode(&self, content: Vec<u8>) -> Result<Vec<T>, String> {
         let array = &self.definition;
         let options = CodecOptions::default().with_validate_checksums(true);
         let decoded = self.codecs.decode(
@@ -204,6 +269,6 @@ impl Decoder {
         );
         let shape: Vec<u64> = self.shape.iter().map(|side| side.get()).collect();
         let decoded = decoded.map_err(|e| e.to_string())?.into_owned();
-        Vec::<f32>::from_array_bytes(decoded, &shape, array.data_type()).map_err(|e| e.to_string())
+        Vec::<T>::from_array_bytes(decoded, &shape, array.data_type()).map_err(|e| e.to_string())
     }
 }

@@ -18,7 +18,9 @@ use futures::future::BoxFuture;
 use futures::stream::{self, StreamExt as _, TryStreamExt as _};
 use storage::{Store, fields, manifests};
 
+use crate::bands::WholeField;
 use crate::edit::ATTEMPTS;
+use crate::field_bands::FieldBands;
 use crate::plan::Plan;
 use crate::staged::Staged;
 use crate::state::State;
@@ -283,19 +285,24 @@ impl Follower<'_> {
         let send = |(place, period, field): (usize, Period, &ObjectKey)| {
             let (store, field) = (self.fields, field.clone());
             async move {
-                let values: Arc<[f32]> = fields::read(store, &field, &grid).await?.into();
-                let values_sha256 = match field.vouches() {
-                    // It was compared with its name when it was read.
-                    Vouched::Values(digest) => digest,
-                    Vouched::Bytes(_) | Vouched::Nothing => {
-                        digest_of(grid, &values, period).await?
-                    }
-                };
-                let step = Step {
+                let step = |values_sha256| Step {
                     period,
                     values_sha256,
                 };
-                Ok::<_, CubeError>((place, edit.send(step, &values).await?))
+                let staged = match field.vouches() {
+                    // It is compared with its name when it is read.
+                    Vouched::Values(digest) => {
+                        let mut bands = FieldBands::new(store, &field, &grid);
+                        edit.send(step(digest), &mut bands).await?
+                    }
+                    Vouched::Bytes(_) | Vouched::Nothing => {
+                        let values: Arc<[f32]> = fields::read(store, &field, &grid).await?.into();
+                        let digest = digest_of(grid, &values, period).await?;
+                        let mut bands = WholeField::new(values, grid.cols);
+                        edit.send(step(digest), &mut bands).await?
+                    }
+                };
+                Ok::<_, CubeError>((place, staged))
             }
         };
         let mut sending = stream::iter(absent).map(send).buffered(at_once(&grid));

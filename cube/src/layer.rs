@@ -11,22 +11,22 @@ use zarrs_icechunk::AsyncIcechunkStore;
 
 use crate::arrays::SERIES;
 use crate::field::SeriesEncoder;
+use crate::levels::{self, Levels, MadeOf};
+use crate::parts::{Parts, Track};
 use crate::plan::Plan;
 use crate::staged::AllStaged;
 use crate::state::State;
-use crate::{CubeError, Description, Repository, arrays, axis, plain};
+use crate::{CubeError, Description, Repository, Step, arrays, axis, plain};
 
-/// Where a chunk comes to lie, and what it refers to; none where no cell has data.
-type Placed = (ChunkIndices, Option<ChunkPayload>);
+/// Where a chunk comes to lie in an array, and what it refers to; none where no cell has data.
+type Placed = (Path, ChunkIndices, Option<ChunkPayload>);
 
 pub(crate) struct Layer<'a> {
     pub(crate) repository: &'a Repository,
     /// What the cube is of afterwards.
     pub(crate) description: &'a Description,
-    /// Rows and columns of all objects of a field.
-    pub(crate) indices: Vec<[u32; 2]>,
-    /// Of the values' array.
-    pub(crate) path: &'a Path,
+    /// Arrays that steps have chunks in.
+    pub(crate) parts: &'a Parts,
     pub(crate) state: &'a State,
     pub(crate) plan: &'a Plan,
     pub(crate) staged: &'a AllStaged,
@@ -53,7 +53,7 @@ impl Layer<'_> {
             (state.steps.len(), self.moved().await?)
         };
         if !is_anew && state.description.as_ref() != Some(description) {
-            plain::write_group(&arrays, description).await?;
+            plain::write_group(&arrays, "", levels::with_levels(description)).await?;
         }
         if plan.steps.len() < before {
             self.cut_off().await?;
@@ -61,13 +61,28 @@ impl Layer<'_> {
         if plan.steps.len() != before {
             plain::write_length(&arrays, description, plan.steps.len()).await?;
         }
+        let none = Levels::default();
+        let levels = if is_anew { &none } else { &state.levels };
+        if self.parts.has_levels() {
+            let count = plan.steps.len();
+            levels
+                .make_room(&state.session, &arrays, description, count)
+                .await?;
+        }
         self.place(placed).await?;
         if !is_anew {
             self.drop_runs(&arrays).await?;
         }
         let compared = if is_anew { &[] } else { &state.steps[..] };
-        if let Some(first) = plan.first_change(compared) {
+        let first = plan.first_change(compared);
+        if let Some(first) = first {
             axis::write(&arrays, description, &plan.steps, first).await?;
+        }
+        if self.parts.has_levels() {
+            let (made_of, first) = (self.made_of(levels), first.unwrap_or(plan.steps.len()));
+            levels
+                .write(&state.session, &arrays, description, (&made_of, first))
+                .await?;
         }
         let mut session = state.session.write().await;
         let properties = description.version.as_ref().map(|version| {
@@ -100,29 +115,63 @@ impl Layer<'_> {
     async fn moved(&self) -> Result<Vec<Placed>, CubeError> {
         let session = self.state.session.read().await;
         let mut moved = vec![];
-        for (new, old) in self.plan.moves() {
-            for [row, col] in &self.indices {
-                let there = ChunkIndices(vec![old as u32, *row, *col]);
-                let payload = session.get_chunk_ref(self.path, &there).await;
-                let here = ChunkIndices(vec![new as u32, *row, *col]);
-                moved.push((here, payload.map_err(|e| self.failed(&e))?));
+        for Track { path, indices } in self.tracks_there()? {
+            for (new, old) in self.plan.moves() {
+                for [row, col] in &indices {
+                    let there = ChunkIndices(vec![old as u32, *row, *col]);
+                    let payload = session.get_chunk_ref(&path, &there).await;
+                    let here = ChunkIndices(vec![new as u32, *row, *col]);
+                    let payload = payload.map_err(|e| self.failed(&e))?;
+                    moved.push((path.clone(), here, payload));
+                }
             }
         }
         Ok(moved)
     }
 
+    /// Arrays that the state has: that of values, and those of levels where it has them.
+    fn tracks_there(&self) -> Result<Vec<Track>, CubeError> {
+        let mut tracks = self.parts.tracks()?;
+        if !self.state.levels.is_there {
+            tracks.truncate(1);
+        }
+        Ok(tracks)
+    }
+
+    /// Of each step to come what its levels are made of; none of one that has none.
+    fn made_of(&self, before: &Levels) -> Vec<Option<MadeOf>> {
+        let plan = self.plan;
+        let moved = plan.old_places.iter().zip(&plan.steps);
+        let kept = |(old, step): (&Option<usize>, &Step)| old.and_then(|old| before.of(old, step));
+        let mut made_of: Vec<Option<MadeOf>> = moved.map(kept).collect();
+        for (place, start) in &plan.staged {
+            made_of[*place] = Some(MadeOf {
+                values_sha256: plan.steps[*place].values_sha256,
+                range: self.staged[start].sent.range,
+            });
+        }
+        made_of
+    }
+
     /// Removes the references of what lies behind the last step to come.
     async fn cut_off(&self) -> Result<(), CubeError> {
         let (before, after) = (self.state.steps.len(), self.plan.steps.len());
-        let mut behind = vec![];
-        for place in after..before {
-            for [row, col] in &self.indices {
-                behind.push(ChunkIndices(vec![place as u32, *row, *col]));
-            }
+        if self.state.levels.is_there {
+            let (levels, session) = (&self.state.levels, &self.state.session);
+            let counts = (before, after);
+            levels.cut_off(session, self.description, counts).await?;
         }
         let mut session = self.state.session.write().await;
-        let cut = session.delete_chunks(self.path, behind).await;
-        cut.map_err(|e| self.failed(&e))?;
+        for Track { path, indices } in self.tracks_there()? {
+            let mut behind = vec![];
+            for place in after..before {
+                for [row, col] in &indices {
+                    behind.push(ChunkIndices(vec![place as u32, *row, *col]));
+                }
+            }
+            let cut = session.delete_chunks(&path, behind).await;
+            cut.map_err(|e| self.failed(&e))?;
+        }
         let axis = arrays::axis(self.description.quantity, before as u64)?;
         for array in axis.arrays() {
             let steps = axis::chunk_steps(array)?;
@@ -181,15 +230,19 @@ impl Layer<'_> {
     /// Gives the values their places in time: those that are there move by reference, those that were put are named.
     async fn place(&self, moved: Vec<Placed>) -> Result<(), CubeError> {
         let mut placed = moved;
+        let tracks = self.parts.tracks()?;
         for (place, start) in &self.plan.staged {
-            for ([row, col], payload) in &self.staged[start].objects {
-                let here = ChunkIndices(vec![*place as u32, *row, *col]);
-                placed.push((here, payload.clone()));
+            for (Track { path, .. }, objects) in tracks.iter().zip(&self.staged[start].sent.objects)
+            {
+                for ([row, col], payload) in objects {
+                    let here = ChunkIndices(vec![*place as u32, *row, *col]);
+                    placed.push((path.clone(), here, payload.clone()));
+                }
             }
         }
         let mut session = self.state.session.write().await;
-        for (here, payload) in placed {
-            let set = session.set_chunk_ref(self.path.clone(), here, payload);
+        for (path, here, payload) in placed {
+            let set = session.set_chunk_ref(path, here, payload);
             set.await.map_err(|e| self.failed(&e))?;
         }
         Ok(())

@@ -8,8 +8,13 @@ use contract::grid::Grid;
 const CHUNK_SIDE: u32 = 512;
 /// Above so many chunks a field's objects hold several each.
 const MOST_OBJECTS: u32 = 64;
-/// Chunks along each side of a shard: 64 MiB of values at most.
-const SHARD_SIDE: u32 = 8;
+/// Chunks down and across a shard: 64 MiB of values at most.
+const SHARD: [u32; 2] = [8, 8];
+/// The same of grids of more cells than [`MOST_SQUARE_CELLS`], and of levels: a row of shards is what is held of a field while it is
+/// written.
+const FLAT_SHARD: [u32; 2] = [2, 32];
+/// Grids of so many cells were the largest ones when shards became flat.
+const MOST_SQUARE_CELLS: usize = 1 << 28;
 
 /// Steps of a run of the time-major copy: a point reads 32 KiB of values for each, and of what no run holds yet a
 /// map-major chunk for each step.
@@ -29,6 +34,16 @@ pub struct Layout {
 impl Layout {
     /// The layout of a grid: a small one is one chunk; others are cut evenly, so that little of the last ones is empty.
     pub fn of(grid: &Grid) -> Self {
+        let is_flat = grid.cell_count() > MOST_SQUARE_CELLS;
+        Self::cut(grid, if is_flat { FLAT_SHARD } else { SHARD })
+    }
+
+    /// That of the grid of a level.
+    pub(crate) fn of_level(grid: &Grid) -> Self {
+        Self::cut(grid, FLAT_SHARD)
+    }
+
+    fn cut(grid: &Grid, shard: [u32; 2]) -> Self {
         if grid.cell_count() <= (CHUNK_SIDE * CHUNK_SIDE) as usize {
             let whole = [grid.rows, grid.cols];
             return Self {
@@ -39,7 +54,7 @@ impl Layout {
         let chunk = [grid.rows, grid.cols].map(|cells| cells.div_ceil(cells.div_ceil(CHUNK_SIDE)));
         let chunks = grid.rows.div_ceil(chunk[0]) * grid.cols.div_ceil(chunk[1]);
         let object = if chunks > MOST_OBJECTS {
-            chunk.map(|cells| cells * SHARD_SIDE)
+            [chunk[0] * shard[0], chunk[1] * shard[1]]
         } else {
             chunk
         };
@@ -97,9 +112,13 @@ mod tests {
         assert_eq!(of(450, 615).chunk, [450, 308]);
         assert_eq!(of(450, 615).series_object(), [456, 312]);
         assert!(!of(720, 1440).is_sharded());
-        let large = of(18_000, 36_000);
-        assert_eq!((large.chunk, large.object), ([500, 508], [4000, 4064]));
-        assert_eq!(large.objects(&grid(18_000, 36_000)), [5, 9]);
+        let large = of(9000, 18_000);
+        assert_eq!((large.chunk, large.object), ([500, 500], [4000, 4000]));
+        let larger = of(18_000, 36_000);
+        assert_eq!((larger.chunk, larger.object), ([500, 508], [1000, 16_256]));
+        assert_eq!(larger.objects(&grid(18_000, 36_000)), [18, 3]);
+        let level = Layout::of_level(&grid(4500, 9000));
+        assert_eq!((level.chunk, level.object), ([500, 500], [1000, 16_000]));
     }
 
     #[test]

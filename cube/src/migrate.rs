@@ -79,7 +79,7 @@ pub async fn migrate(
     for number in manifests::numbers(store, product).await? {
         // Clean-up may have taken it meanwhile.
         if let Some(manifest) = manifests::numbered(store, product, number).await? {
-            versions.push(migration.version(&manifest).await?);
+            versions.push(Box::pin(migration.version(&manifest)).await?);
             newest = Some(manifest);
         }
     }

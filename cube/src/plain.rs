@@ -9,7 +9,7 @@ use contract::key::ObjectKey;
 use contract::time::Period;
 use futures::future::BoxFuture;
 use futures::stream::{self, StreamExt as _, TryStreamExt as _};
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 use storage::Store;
 use zarrs::array::ArrayBytes;
 use zarrs::group::{Group, GroupBuilder};
@@ -18,7 +18,7 @@ use zarrs::storage::{
 };
 
 use crate::arrays::{self, Fixed};
-use crate::field::{EncodedObject, Encoder};
+use crate::field::{EncodedObject, Encoder, Number};
 use crate::{CubeError, Description, Step, axis};
 
 /// Objects of a field that are encoded and sent at a time.
@@ -32,8 +32,18 @@ pub(crate) async fn write_frame_of_reference<S>(
 where
     S: AsyncWritableStorageTraits + 'static,
 {
-    write_group(store, description).await?;
-    for fixed in arrays::fixed(description)? {
+    write_group(store, "", description.attributes()).await?;
+    write_fixed(store, arrays::fixed(description)?).await?;
+    write_length(store, description, 0).await?;
+    axis::write(store, description, &[], 0).await
+}
+
+/// Writes arrays that never change.
+pub(crate) async fn write_fixed<S>(store: &Arc<S>, all: Vec<Fixed>) -> Result<(), CubeError>
+where
+    S: AsyncWritableStorageTraits + 'static,
+{
+    for fixed in all {
         let (definition, bytes) = match fixed {
             Fixed::Floats(definition, numbers) => {
                 let bytes = numbers.iter().flat_map(|it| it.to_ne_bytes()).collect();
@@ -50,20 +60,20 @@ where
         let stored = array.async_store_chunk(&index, ArrayBytes::new_flen(bytes));
         stored.await.map_err(|e| failed(e.to_string()))?;
     }
-    write_length(store, description, 0).await?;
-    axis::write(store, description, &[], 0).await
+    Ok(())
 }
 
-/// Writes the group, which says what the arrays are of.
+/// Writes a group: the one of all, whose name is empty, says what the arrays are of.
 pub(crate) async fn write_group<S>(
     store: &Arc<S>,
-    description: &Description,
+    name: &str,
+    attributes: Map<String, Value>,
 ) -> Result<(), CubeError>
 where
     S: AsyncWritableStorageTraits + 'static,
 {
-    let stored = group(store, description)?.async_store_metadata().await;
-    stored.map_err(|e| CubeError::library("the group", "writing", e))
+    let stored = group(store, name, attributes)?.async_store_metadata().await;
+    stored.map_err(|e| CubeError::library(&format!("the group {name:?}"), "writing", e))
 }
 
 /// Writes of how many steps the values are.
@@ -81,18 +91,22 @@ where
     stored.map_err(|e| CubeError::library(&arrays::name(&array), "writing", e))
 }
 
-fn group<S>(store: &Arc<S>, description: &Description) -> Result<Group<S>, CubeError> {
+fn group<S>(
+    store: &Arc<S>,
+    name: &str,
+    attributes: Map<String, Value>,
+) -> Result<Group<S>, CubeError> {
     let mut builder = GroupBuilder::new();
-    builder.attributes(description.attributes());
-    let built = builder.build(Arc::clone(store), "/");
-    built.map_err(|e| CubeError::library("the group", "defining it", e))
+    builder.attributes(attributes);
+    let built = builder.build(Arc::clone(store), &format!("/{name}"));
+    built.map_err(|e| CubeError::library(&format!("the group {name:?}"), "defining it", e))
 }
 
 /// Plain Zarr as it is being written.
 pub struct PlainZarr {
     folder: Arc<Folder>,
     description: Description,
-    encoder: Arc<Encoder>,
+    encoder: Arc<Encoder<f32>>,
     steps: Vec<Step>,
 }
 
@@ -146,24 +160,28 @@ impl PlainZarr {
             check_length(&values, grid.cell_count())?;
             let at = self.steps.len() as u64;
             let values_array = arrays::values(&self.description, at + 1)?;
-            let sent: Vec<_> = encoded(&self.encoder, &values)
-                .map(|object| {
-                    let (folder, array) = (&self.folder, &values_array);
-                    async move {
-                        let EncodedObject { index, content } = object?;
-                        let Some(content) = content else {
-                            return Ok(());
-                        };
-                        let [row, col] = index.map(u64::from);
-                        let key = array.chunk_key(&[at, row, col]);
-                        let set = folder.set(&key, content).await;
-                        set.map_err(|e| CubeError::library(key.as_str(), "writing", e))
-                    }
-                })
-                .buffer_unordered(OBJECTS_AT_ONCE)
-                .try_collect()
-                .await?;
-            drop::<Vec<()>>(sent);
+            for (row, rows) in self.encoder.bands().enumerate() {
+                let cells = |row: u32| row as usize * grid.cols as usize;
+                let band: Arc<[f32]> = values[cells(rows.start)..cells(rows.end)].into();
+                let sent: Vec<()> = encoded(&self.encoder, row as u32, band)
+                    .map(|object| {
+                        let (folder, array) = (&self.folder, &values_array);
+                        async move {
+                            let EncodedObject { index, content } = object?;
+                            let Some(content) = content else {
+                                return Ok(());
+                            };
+                            let [row, col] = index.map(u64::from);
+                            let key = array.chunk_key(&[at, row, col]);
+                            let set = folder.set(&key, content).await;
+                            set.map_err(|e| CubeError::library(key.as_str(), "writing", e))
+                        }
+                    })
+                    .buffer_unordered(OBJECTS_AT_ONCE)
+                    .try_collect()
+                    .await?;
+                drop(sent);
+            }
             let step = Step {
                 period,
                 values_sha256: storage::fields::digest_of(&grid, &values, period),
@@ -187,8 +205,9 @@ impl PlainZarr {
         for (name, metadata) in &arrays {
             folder.set_metadata(name, metadata).await?;
         }
-        let mut metadata = serde_json::to_value(group(folder, description)?.metadata())
-            .map_err(|e| CubeError::library("the group", "describing it", e))?;
+        let mut metadata =
+            serde_json::to_value(group(folder, "", description.attributes())?.metadata())
+                .map_err(|e| CubeError::library("the group", "describing it", e))?;
         metadata["consolidated_metadata"] =
             json!({ "kind": "inline", "must_understand": false, "metadata": arrays });
         folder.set_metadata("", &metadata).await
@@ -205,17 +224,18 @@ pub(crate) fn check_length(values: &[f32], expected: usize) -> Result<(), CubeEr
     })
 }
 
-/// The objects of a field, encoded on other threads a few at a time.
-pub(crate) fn encoded(
-    encoder: &Arc<Encoder>,
-    values: &Arc<[f32]>,
-) -> impl stream::Stream<Item = Result<EncodedObject, CubeError>> + use<> {
-    let (encoder, values) = (Arc::clone(encoder), Arc::clone(values));
-    stream::iter(encoder.indices())
+/// A row of objects from the band of rows that it holds, encoded on other threads a few at a time.
+pub(crate) fn encoded<T: Number>(
+    encoder: &Arc<Encoder<T>>,
+    row: u32,
+    band: Arc<[T]>,
+) -> impl stream::Stream<Item = Result<EncodedObject, CubeError>> + use<T> {
+    let encoder = Arc::clone(encoder);
+    stream::iter(encoder.indices_in(row))
         .map(move |index| {
-            let (encoder, values) = (Arc::clone(&encoder), Arc::clone(&values));
+            let (encoder, band) = (Arc::clone(&encoder), Arc::clone(&band));
             async move {
-                let encoded = tokio::task::spawn_blocking(move || encoder.encode(&values, index));
+                let encoded = tokio::task::spawn_blocking(move || encoder.encode(&band, index));
                 encoded
                     .await
                     .map_err(|e| CubeError::library("a thread", "encoding", e))?

@@ -106,6 +106,7 @@ impl Plan {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::parts::SentStep;
     use crate::staged::Staged;
     use contract::digest::Digest;
 
@@ -120,7 +121,10 @@ mod tests {
         let staged = put.iter().map(|step| {
             let staged = Staged {
                 step: *step,
-                objects: vec![],
+                sent: SentStep {
+                    objects: vec![],
+                    range: [0.0; 2],
+                },
             };
             (step.period.start, staged)
         });

@@ -1,30 +1,26 @@
 //! One state of a cube, to read: windows of cells of a step, whole fields, blocks of its time-major copy.
 
-use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use bytes::Bytes;
 use contract::chunk::Window;
+use contract::digest::Digest;
+use contract::level::{self, Level};
 use futures::future::BoxFuture;
-use futures::stream::{self, StreamExt as _, TryStreamExt as _};
 use icechunk::session::Session;
 use tokio::sync::RwLock;
-use zarrs::array::{Array, AsyncArrayShardedReadableExt as _, AsyncArrayShardedReadableExtCache};
 use zarrs_icechunk::AsyncIcechunkStore;
 
 use crate::arrays::SERIES;
 use crate::blocks::Blocks;
-use crate::error::first_lines;
-use crate::field::Decoder;
+use crate::joining::WHOLLY_COVERED;
 use crate::layout::RUN_STEPS;
+use crate::levels::Levels;
+use crate::maps::Maps;
 use crate::object_storage::ObjectStorage;
 use crate::series::Runs;
 use crate::sums::Sums;
-use crate::unreadable::Object;
 use crate::{CubeError, Description, Layout, Step, arrays, axis};
-
-/// Chunks that are read and decoded at a time.
-const CHUNKS_AT_ONCE: usize = 8;
 
 /// One state of a cube. It does not change; clones share it.
 #[derive(Clone)]
@@ -32,14 +28,12 @@ pub struct Cube(Arc<Inner>);
 
 struct Inner {
     description: Description,
-    /// For messages.
-    place: String,
-    layout: Layout,
     steps: Vec<Step>,
-    array: Array<AsyncIcechunkStore>,
-    /// Indexes of shards.
-    shards: AsyncArrayShardedReadableExtCache,
-    decoder: Arc<Decoder>,
+    values: Maps<f32>,
+    /// Of which steps levels are there.
+    level_names: Levels,
+    /// Reads them; none where there are none.
+    levels: Vec<LevelMaps>,
     /// Runs of the time-major copy.
     runs: Runs,
     /// Of each run, how many of the steps in its place it holds, the first ones.
@@ -52,6 +46,52 @@ struct Inner {
     records: Option<Blocks>,
 }
 
+/// Reads one level.
+struct LevelMaps {
+    level: Level,
+    values: Maps<f32>,
+    coverage: Maps<u8>,
+}
+
+/// Cells of a coarser level.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LevelWindow {
+    /// `[row, col]`, stored unit, NaN no data: means by area of the cells that hold data, unless the quantity has none
+    /// (docs/decisions/032-levels.md).
+    pub values: Vec<f32>,
+    /// `[row, col]`: share of the area of each cell that holds data, in steps of [`WHOLLY_COVERED`](crate::WHOLLY_COVERED).
+    pub coverage: Vec<u8>,
+}
+
+impl LevelWindow {
+    /// That of cells of the values themselves, which have data or have none.
+    pub fn of_cells(values: Vec<f32>) -> Self {
+        let coverage = |value: &f32| if value.is_nan() { 0 } else { WHOLLY_COVERED };
+        Self {
+            coverage: values.iter().map(coverage).collect(),
+            values,
+        }
+    }
+}
+
+impl LevelMaps {
+    async fn open(
+        store: &Arc<AsyncIcechunkStore>,
+        description: &Description,
+        level: Level,
+        place: &str,
+    ) -> Result<Self, CubeError> {
+        let cut = || (&level.grid, Layout::of_level(&level.grid));
+        let values = arrays::level_values(description, &level, 1)?;
+        let coverage = arrays::level_coverage(description, &level, 1)?;
+        Ok(Self {
+            values: Maps::open(store, values, cut(), place).await?,
+            coverage: Maps::open(store, coverage, cut(), place).await?,
+            level,
+        })
+    }
+}
+
 impl Cube {
     pub(crate) async fn open(session: Session, objects: &ObjectStorage) -> Result<Self, CubeError> {
         let place = &objects.to_string();
@@ -59,19 +99,27 @@ impl Cube {
         let description = Description::of_group(&store, place).await?;
         let steps = axis::read(&store, &description, place).await?;
         let definition = arrays::values(&description, steps.len() as u64)?;
-        let array = axis::open(&store, &definition, place).await?;
-        if array.shape()[0] != steps.len() as u64 {
+        let cut = (&description.grid, Layout::of(&description.grid));
+        let values = Maps::open(&store, definition, cut, place).await?;
+        if values.steps() != steps.len() as u64 {
             return Err(CubeError::Foreign {
                 place: place.to_owned(),
-                array: arrays::name(&array),
-                reason: format!("it has {} steps, time {}", array.shape()[0], steps.len()),
+                array: values.name(),
+                reason: format!("it has {} steps, time {}", values.steps(), steps.len()),
             });
         }
         let session = store.session();
         let session = session.read().await;
         let runs = Runs::read(&session, &store, SERIES, place).await?;
         let sums = Sums::read(&session, &store, &description, place).await?;
+        let level_names = Levels::read(&session, &store, &description, place).await?;
         drop(session);
+        let mut levels = vec![];
+        if level_names.is_there {
+            for level in level::levels(&description.grid) {
+                levels.push(LevelMaps::open(&store, &description, level, place).await?);
+            }
+        }
         let blocks = match runs.len() {
             0 => None,
             count => {
@@ -95,13 +143,11 @@ impl Cube {
             blocks,
             sums,
             records,
-            layout: Layout::of(&description.grid),
-            shards: AsyncArrayShardedReadableExtCache::new(&array),
-            decoder: Arc::new(Decoder::new(&description)?),
             description,
-            place: place.to_owned(),
             steps,
-            array,
+            values,
+            level_names,
+            levels,
         })))
     }
 
@@ -133,28 +179,83 @@ impl Cube {
         step: usize,
         windows: &[Window],
     ) -> Result<Vec<Vec<f32>>, CubeError> {
-        let mut touched: BTreeMap<[u32; 2], Vec<usize>> = BTreeMap::new();
-        let mut values = vec![];
-        for (number, window) in windows.iter().enumerate() {
-            self.check(step, *window)?;
-            values.push(vec![f32::NAN; window.cell_count()]);
-            for chunk in self.0.layout.chunks_of(*window) {
-                touched.entry(chunk).or_default().push(number);
+        self.0.values.windows(step, windows).await
+    }
+
+    /// Coarser levels that steps have; none of a grid that is small.
+    pub fn levels(&self) -> impl Iterator<Item = &Level> {
+        self.0.levels.iter().map(|own| &own.level)
+    }
+
+    /// Are the levels of a step there? They are used only if they were made of its values.
+    pub fn has_levels(&self, step: usize) -> bool {
+        self.range_of(step).is_some()
+    }
+
+    /// Smallest and largest value of a step that has levels, 0 and 0 without data: what is found in any window of any of them lies
+    /// between, unless values are directions.
+    pub fn range_of(&self, step: usize) -> Option<[f32; 2]> {
+        let own = self.0.steps.get(step)?;
+        let made_of = self.0.level_names.of(step, own)?;
+        (!self.0.levels.is_empty()).then_some(made_of.range)
+    }
+
+    /// The place of a step with these values, if it is there.
+    pub fn step_of(&self, values_sha256: &Digest) -> Option<usize> {
+        let steps = self.0.steps.iter();
+        steps
+            .clone()
+            .position(|step| step.values_sha256 == *values_sha256)
+    }
+
+    /// A window of cells of a coarser level of a step, by the number of the level; level 0 are the values themselves. Only its chunks
+    /// are read. None where the step has no levels, or not this one.
+    ///
+    /// # Errors
+    /// `Outside` if there is no such step or window; a chunk that is damaged or gone, by its name.
+    pub fn window_at(
+        &self,
+        level: u32,
+        window: Window,
+        step: usize,
+    ) -> BoxFuture<'_, Result<Option<LevelWindow>, CubeError>> {
+        Box::pin(async move {
+            if level == 0 {
+                let values = self.window(step, window).await?;
+                return Ok(Some(LevelWindow::of_cells(values)));
             }
+            let own = self.0.levels.iter().find(|own| own.level.number == level);
+            let Some(own) = own.filter(|_| self.has_levels(step)) else {
+                return Ok(None);
+            };
+            let windows = [window];
+            let (mut values, mut coverage) = futures::try_join!(
+                own.values.windows(step, &windows),
+                own.coverage.windows(step, &windows)
+            )?;
+            Ok(Some(LevelWindow {
+                values: values.pop().unwrap_or_default(),
+                coverage: coverage.pop().unwrap_or_default(),
+            }))
+        })
+    }
+
+    /// The first steps that have no levels, though they should.
+    pub(crate) fn without_levels(&self) -> Vec<usize> {
+        if level::levels(&self.0.description.grid).is_empty() {
+            return vec![];
         }
-        let mut read = stream::iter(touched)
-            .map(|(chunk, own)| async move {
-                let found = self.chunk(step, chunk).await?;
-                Ok::<_, CubeError>((chunk, own, found))
-            })
-            .buffered(CHUNKS_AT_ONCE);
-        while let Some((chunk, own, found)) = read.try_next().await? {
-            let Some(found) = found else { continue };
-            for number in own {
-                self.copy(&found, chunk, windows[number], &mut values[number]);
-            }
-        }
-        Ok(values)
+        let steps = self.0.steps.iter().enumerate();
+        steps
+            .filter(|(place, step)| self.0.level_names.of(*place, step).is_none())
+            .map(|(place, _)| place)
+            .collect()
+    }
+
+    /// Names of the arrays of levels.
+    pub(crate) fn level_array_names(&self) -> Vec<String> {
+        let names = |own: &LevelMaps| [own.values.name(), own.coverage.name()];
+        self.0.levels.iter().flat_map(names).collect()
     }
 
     /// Values of a whole step, `[row, col]`, compared with their digest.
@@ -176,7 +277,7 @@ impl Cube {
                 let digest = storage::fields::digest_of(&grid, &values, period);
                 (digest, values)
             });
-            let array = || arrays::name(&self.0.array);
+            let array = || self.0.values.name();
             let (digest, values) = digested
                 .await
                 .map_err(|e| CubeError::library(&array(), "checking values", e))?;
@@ -297,12 +398,12 @@ impl Cube {
 
     /// What reads its parts.
     pub(crate) fn session(&self) -> Arc<RwLock<Session>> {
-        self.0.array.storage().session()
+        self.0.values.array.storage().session()
     }
 
     /// Name of the values' array.
     pub(crate) fn array_name(&self) -> String {
-        arrays::name(&self.0.array)
+        self.0.values.name()
     }
 
     /// Name of the array of the time-major copy, if there is one.
@@ -320,85 +421,5 @@ impl Cube {
             Some(blocks) => blocks.shard(run, shard).await,
             None => Ok(None),
         }
-    }
-
-    /// Values of a whole chunk, `[row, col]`; none where it is not stored, since no cell has data.
-    async fn chunk(&self, step: usize, chunk: [u32; 2]) -> Result<Option<Vec<f32>>, CubeError> {
-        let inner = &self.0;
-        let index = [step as u64, chunk[0].into(), chunk[1].into()];
-        match self.decoded(index).await {
-            Ok(values) => Ok(values),
-            Err(reason) => {
-                let [rows, cols] =
-                    [0, 1].map(|at| inner.layout.object[at] / inner.layout.chunk[at]);
-                let object = Object {
-                    array: &inner.array,
-                    place: &inner.place,
-                    index: [
-                        index[0],
-                        index[1] / u64::from(rows),
-                        index[2] / u64::from(cols),
-                    ],
-                };
-                Err(object.unreadable(index, &reason).await)
-            }
-        }
-    }
-
-    async fn decoded(&self, index: [u64; 3]) -> Result<Option<Vec<f32>>, String> {
-        let inner = &self.0;
-        let found = if inner.layout.is_sharded() {
-            let found = inner
-                .array
-                .async_retrieve_encoded_subchunk(&inner.shards, &index);
-            found.await.map_err(|e| first_lines(&e))
-        } else {
-            let found = inner.array.async_retrieve_encoded_chunk(&index).await;
-            found
-                .map(|found| found.map(Vec::from))
-                .map_err(|e| first_lines(&e))
-        };
-        let Some(content) = found? else {
-            return Ok(None);
-        };
-        let decoder = Arc::clone(&inner.decoder);
-        let decoded = tokio::task::spawn_blocking(move || decoder.decode(content));
-        decoded.await.map_err(|e| e.to_string())?.map(Some)
-    }
-
-    /// Copies the cells that a chunk and a window share.
-    fn copy(&self, chunk: &[f32], index: [u32; 2], window: Window, values: &mut [f32]) {
-        let [rows, cols] = self.0.layout.chunk;
-        let (top, left) = (index[0] * rows, index[1] * cols);
-        let (first, last) = (
-            left.max(window.col),
-            (left + cols).min(window.col + window.cols),
-        );
-        let width = (last - first) as usize;
-        for row in top.max(window.row)..(top + rows).min(window.row + window.rows) {
-            let from = (row - top) as usize * cols as usize + (first - left) as usize;
-            let to =
-                (row - window.row) as usize * window.cols as usize + (first - window.col) as usize;
-            values[to..to + width].copy_from_slice(&chunk[from..from + width]);
-        }
-    }
-
-    fn check(&self, step: usize, window: Window) -> Result<(), CubeError> {
-        let grid = &self.0.description.grid;
-        let fits = |from: u32, count: u32, all: u32| {
-            count > 0 && from.checked_add(count).is_some_and(|end| end <= all)
-        };
-        if step < self.0.steps.len()
-            && fits(window.row, window.rows, grid.rows)
-            && fits(window.col, window.cols, grid.cols)
-        {
-            return Ok(());
-        }
-        Err(CubeError::Outside {
-            what: format!("step {step}, {window:?}"),
-            steps: self.0.steps.len(),
-            rows: grid.rows,
-            cols: grid.cols,
-        })
     }
 }

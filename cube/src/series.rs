@@ -10,13 +10,11 @@ use contract::digest::Digest;
 use icechunk::format::Path;
 use icechunk::session::{Session, SessionErrorKind};
 use serde_json::{Map, Value};
-use zarrs::group::GroupBuilder;
 use zarrs::storage::{AsyncReadableStorageTraits, AsyncWritableStorageTraits};
 
-use crate::arrays::{self, DIGEST_BYTES, DIGEST_CHUNK, Definition};
-use crate::error::first_lines;
+use crate::arrays::{self, Definition};
 use crate::layout::RUN_STEPS;
-use crate::{CubeError, Step, axis};
+use crate::{CubeError, Step, names, plain};
 
 /// So many steps more are worth making the last run anew.
 const LEAST_NEW: usize = 16;
@@ -45,31 +43,9 @@ impl Runs {
             }
             Err(e) => return Err(CubeError::library(place, "looking for the series", e)),
         }
-        let array = axis::open(arrays, &arrays::runs(group, 1)?, place).await?;
-        let runs = array.shape()[0];
-        let chunk_bytes = (DIGEST_CHUNK * DIGEST_BYTES) as usize;
-        let mut bytes: Vec<u8> = vec![];
-        for chunk in 0..runs.div_ceil(DIGEST_CHUNK) {
-            let index = [chunk, 0];
-            let found = array.async_retrieve_chunk_if_exists::<Vec<u8>>(&index);
-            let found = found.await.map_err(|e| CubeError::Chunk {
-                array: arrays::name(&array),
-                chunk: index.to_vec(),
-                reason: first_lines(&e),
-            })?;
-            // One of which no run is there is not stored.
-            bytes.extend(found.unwrap_or_else(|| vec![0; chunk_bytes]));
-        }
-        bytes.truncate((runs * DIGEST_BYTES) as usize);
-        let digest = |bytes: &[u8]| {
-            let bytes: [u8; DIGEST_BYTES as usize] = bytes.try_into().unwrap_or_default();
-            bytes
-                .iter()
-                .any(|byte| *byte != 0)
-                .then(|| Digest::from_bytes(bytes))
-        };
-        let chunks = bytes.chunks_exact(DIGEST_BYTES as usize);
-        Ok(Self(chunks.map(digest).collect()))
+        names::read(arrays, &arrays::runs(group, 1)?, place)
+            .await
+            .map(Self)
     }
 
     /// How many there are, those that are not there among them.
@@ -148,30 +124,11 @@ impl Runs {
     where
         S: AsyncWritableStorageTraits + 'static,
     {
-        let failed = |e: String| CubeError::library(name, "writing", e);
-        let mut group = GroupBuilder::new();
-        group.attributes(attributes);
-        let group = group.build(Arc::clone(store), &format!("/{name}"));
-        let group = group.map_err(|e| failed(e.to_string()))?;
-        let stored = group.async_store_metadata().await;
-        stored.map_err(|e| failed(e.to_string()))?;
+        plain::write_group(store, name, attributes).await?;
         let array = array.with_storage(Arc::clone(store));
         let stored = array.async_store_metadata().await;
-        stored.map_err(|e| failed(e.to_string()))?;
-        let array = arrays::runs(name, self.len())?.with_storage(Arc::clone(store));
-        let stored = array.async_store_metadata().await;
-        stored.map_err(|e| failed(e.to_string()))?;
-        for (chunk, names) in self.0.chunks(DIGEST_CHUNK as usize).enumerate() {
-            let bytes = names.iter().flat_map(|name| match name {
-                Some(name) => *name.as_bytes(),
-                None => [0; DIGEST_BYTES as usize],
-            });
-            let mut bytes: Vec<u8> = bytes.collect();
-            bytes.resize((DIGEST_CHUNK * DIGEST_BYTES) as usize, 0);
-            let stored = array.async_store_chunk(&[chunk as u64, 0], bytes).await;
-            stored.map_err(|e| failed(e.to_string()))?;
-        }
-        Ok(())
+        stored.map_err(|e| CubeError::library(name, "writing", e))?;
+        names::write(store, arrays::runs(name, self.len())?, &self.0, 0).await
     }
 }
 

@@ -8,6 +8,7 @@ use tokio::sync::RwLock;
 use zarrs_icechunk::AsyncIcechunkStore;
 
 use crate::arrays::SERIES;
+use crate::levels::Levels;
 use crate::series::Runs;
 use crate::sums::Sums;
 use crate::{CubeError, Description, Repository, Step, axis};
@@ -24,6 +25,8 @@ pub(crate) struct State {
     pub(crate) runs: Runs,
     /// Sums of blocks.
     pub(crate) sums: Sums,
+    /// Coarser levels.
+    pub(crate) levels: Levels,
 }
 
 impl State {
@@ -36,8 +39,14 @@ impl State {
             Err(e) => return Err(repository.failed("reading the newest state", &e)),
         };
         let snapshot = session.read().await.snapshot_id().to_string();
-        let (description, steps, runs, sums) = if is_empty {
-            (None, vec![], Runs::default(), Sums::default())
+        let (description, steps, runs, sums, levels) = if is_empty {
+            (
+                None,
+                vec![],
+                Runs::default(),
+                Sums::default(),
+                Levels::default(),
+            )
         } else {
             let arrays = Arc::new(AsyncIcechunkStore::from(Arc::clone(&session)));
             let description = Description::of_group(&arrays, &repository.place).await?;
@@ -45,8 +54,9 @@ impl State {
             let own = session.read().await;
             let runs = Runs::read(&own, &arrays, SERIES, &repository.place).await?;
             let sums = Sums::read(&own, &arrays, &description, &repository.place).await?;
+            let levels = Levels::read(&own, &arrays, &description, &repository.place).await?;
             drop(own);
-            (Some(description), steps, runs, sums)
+            (Some(description), steps, runs, sums, levels)
         };
         Ok(Self {
             session,
@@ -55,6 +65,7 @@ impl State {
             steps,
             runs,
             sums,
+            levels,
         })
     }
 

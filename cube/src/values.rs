@@ -18,9 +18,11 @@ use futures::stream::{self, StreamExt as _, TryStreamExt as _};
 use storage::{Store, fields};
 
 use crate::blocks::BlockDecoder;
+use crate::field_bands::FieldBands;
 use crate::follow::folder;
+use crate::joined::joined_window;
 use crate::layout::{BLOCK_CELLS, RUN_STEPS};
-use crate::{At, Cube, CubeError, Repository};
+use crate::{At, Cube, CubeError, LevelWindow, Repository};
 
 /// Runs that are read at a time.
 const RUNS_AT_ONCE: usize = 16;
@@ -345,6 +347,40 @@ impl Values {
                 Ok(windows.iter().map(of).collect())
             }
         }
+    }
+
+    /// A window of cells of a coarser level of one step, by the level's number; level 0 are the values themselves. Of the cube the
+    /// chunks that it touches; where that has no levels of the step, they are made of the field.
+    ///
+    /// # Errors
+    /// As [`Values::cell`].
+    pub async fn window_at(
+        &self,
+        level: u32,
+        window: Window,
+        step: usize,
+    ) -> Result<LevelWindow, CubeError> {
+        let Inner {
+            store,
+            manifest,
+            places,
+            cubes,
+        } = &*self.0;
+        let Some(place) = places.get(step) else {
+            return Err(self.outside(&format!("step {step}")));
+        };
+        if let Place::Cube { cube, step } = place
+            && let Some(found) = cubes[*cube].window_at(level, window, *step).await?
+        {
+            return Ok(found);
+        }
+        if level == 0 {
+            let mut values = self.windows(step, &[window]).await?;
+            return Ok(LevelWindow::of_cells(values.pop().unwrap_or_default()));
+        }
+        let mut bands = FieldBands::new(store, &manifest.steps[step].field, &manifest.grid);
+        let of = (&manifest.grid, manifest.quantity);
+        joined_window(of, level, window, &mut bands).await
     }
 
     /// Blocks of a run of steps as they are stored, where the time-major copy holds all of these steps; they are decoded one

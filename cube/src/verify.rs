@@ -1,4 +1,4 @@
-//! The cube of a product in, what is wrong with it out: every version opened, every step compared with its digest, every
+//! The cube of a product in, what is wrong with it out: every version opened, every step compared with its digest and its levels with it, every
 //! run of its time-major copy and the sums of it with its steps, every chunk that is damaged or gone told by the array and the place it has there.
 //!
 //! Objects themselves are compared with their checksums and seals by `storage::verify`, as those of all kinds are.
@@ -15,7 +15,7 @@ use storage::verify::{Fault, Finding};
 use storage::{Store, manifests};
 
 use crate::follow::folder;
-use crate::{At, Cube, CubeError, Repository, Step, compact, series};
+use crate::{At, Cube, CubeError, Repository, Step, compact, complete, series};
 
 /// What a cube was found to be.
 #[derive(Debug, Clone, Default)]
@@ -200,8 +200,12 @@ impl Check<'_> {
             if broken.steps.contains(&(place as u32)) {
                 continue;
             }
-            match cube.field(place).await {
-                Ok(_values) => {}
+            let checked_step = match cube.field(place).await {
+                Ok(_values) => complete::compare(cube, place).await,
+                Err(error) => Err(error),
+            };
+            match checked_step {
+                Ok(()) => {}
                 Err(error @ (CubeError::Chunk { .. } | CubeError::Step { .. })) => {
                     let mut finding = self.finding(&error);
                     finding.reason = format!("{error} (step {} of {shown})", step.period);
@@ -243,6 +247,7 @@ impl Check<'_> {
         let failed = |e| CubeError::library(&self.folder, "listing chunks", e);
         let mut chunks = std::pin::pin!(session.all_chunks().await.map_err(failed)?);
         let mut broken = Broken::default();
+        let of_levels = cube.level_array_names();
         while let Some((path, chunk)) = chunks.try_next().await.map_err(failed)? {
             let ChunkPayload::Ref(reference) = &chunk.payload else {
                 continue;
@@ -255,7 +260,7 @@ impl Check<'_> {
             if !is_gone && !self.damaged.contains(&key) {
                 continue;
             }
-            if array == cube.array_name() {
+            if array == cube.array_name() || of_levels.iter().any(|own| own == array) {
                 broken.steps.extend(index.first());
             } else if [cube.series_name(), cube.sums_name()].contains(&Some(array.to_owned())) {
                 broken.runs.extend(index.last());

@@ -44,6 +44,7 @@ pub fn scene(
         terrain: None,
         northward: Some(part(1)),
         trails: None,
+        whole: None,
     }
 }
 

@@ -101,6 +101,7 @@ pub fn scene(grid: Grid) -> Scene {
         terrain: None,
         northward: None,
         trails: None,
+        whole: None,
     }
 }
 

@@ -1,6 +1,7 @@
 //! What can go wrong between a render job and its stored picture.
 
 use contract::key::ObjectKey;
+use cube::CubeError;
 use legend::LegendError;
 use render::RenderError;
 use storage::StorageError;
@@ -18,6 +19,15 @@ pub enum DrawError {
         product: String,
         source: Box<StorageError>,
     },
+    /// Reading a level of a very large field failed.
+    #[error("cannot read a window of {product}")]
+    Cube {
+        product: String,
+        source: Box<CubeError>,
+    },
+    /// A product is too large for what the job asks of it.
+    #[error("{product} is too large for this picture: {reason}")]
+    Large { product: String, reason: String },
     /// The picture could not be read from the store or put there.
     #[error("cannot {what} picture {key}")]
     Picture {
@@ -33,25 +43,50 @@ pub enum DrawError {
     Thread(#[source] tokio::task::JoinError),
 }
 
+fn is_not_found(error: &CubeError) -> bool {
+    matches!(error, CubeError::Storage(source) if source.is_not_found())
+}
+
 impl DrawError {
+    /// What is stored does not lie on the grid of the job.
+    pub(crate) fn mismatch(key: &ObjectKey) -> Self {
+        Self::Render(RenderError::GridMismatch {
+            product: "the job".to_owned(),
+            accumulated: key.to_string(),
+        })
+    }
+
     /// May the same job succeed later?
     pub fn is_retryable(&self) -> bool {
         match self {
             Self::Render(error) => error.is_retryable(),
             Self::Store { source, .. } | Self::Picture { source, .. } => source.is_retryable(),
+            Self::Cube { source, .. } => source.is_retryable(),
             Self::Thread(_) => true,
-            Self::Annotations(_) => false,
+            Self::Annotations(_) | Self::Large { .. } => false,
         }
     }
 
     /// Is the job, not the worker, to blame?
     pub fn is_bad_request(&self) -> bool {
-        matches!(self, Self::Render(error) if error.is_bad_request())
+        match self {
+            Self::Render(error) => error.is_bad_request(),
+            Self::Large { .. } => true,
+            Self::Store { .. }
+            | Self::Cube { .. }
+            | Self::Picture { .. }
+            | Self::Annotations(_)
+            | Self::Thread(_) => false,
+        }
     }
 
     /// Does the job name something that is not stored?
     pub fn is_not_found(&self) -> bool {
-        matches!(self, Self::Store { source, .. } if source.is_not_found())
+        match self {
+            Self::Store { source, .. } => source.is_not_found(),
+            Self::Cube { source, .. } => is_not_found(source),
+            _ => false,
+        }
     }
 
     /// Is the device to blame, so that a fresh one may draw the job?
@@ -60,7 +95,11 @@ impl DrawError {
             Self::Render(error) => error.is_device_fault(),
             // Drivers and the library over them give up by a panic where they have no error to return.
             Self::Thread(lost) => lost.is_panic(),
-            Self::Store { .. } | Self::Picture { .. } | Self::Annotations(_) => false,
+            Self::Store { .. }
+            | Self::Cube { .. }
+            | Self::Large { .. }
+            | Self::Picture { .. }
+            | Self::Annotations(_) => false,
         }
     }
 
@@ -69,7 +108,8 @@ impl DrawError {
     pub fn is_final(&self) -> bool {
         match self {
             Self::Render(error) => error.is_final(),
-            Self::Thread(_) | Self::Annotations(_) => true,
+            Self::Thread(_) | Self::Annotations(_) | Self::Large { .. } => true,
+            Self::Cube { source, .. } => !source.is_retryable(),
             Self::Store { source, .. } => {
                 source.is_not_found() || matches!(**source, StorageError::Damaged { .. })
             }

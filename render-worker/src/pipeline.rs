@@ -17,6 +17,7 @@ use storage::Store;
 use crate::annotation::Lifted;
 use crate::encoding::Encoders;
 use crate::error::DrawError;
+use crate::large::MOST_WHOLE_CELLS;
 use crate::prefetch::Prefetch;
 use crate::source::{Kept, Source};
 
@@ -33,6 +34,8 @@ pub struct Limits {
     pub device_field_bytes: Option<u64>,
     /// Fields of every product read ahead of the one drawn; none with 0.
     pub fields_ahead: usize,
+    /// Fields of more cells are not held whole: what pictures show of them is read by windows of their levels.
+    pub whole_cells: u64,
 }
 
 impl Default for Limits {
@@ -44,6 +47,7 @@ impl Default for Limits {
             field_bytes: 512 << 20,
             device_field_bytes: None,
             fields_ahead: 1,
+            whole_cells: MOST_WHOLE_CELLS,
         }
     }
 }
@@ -78,11 +82,8 @@ impl Pipeline {
     /// Opens the backend. Blocks while shaders compile.
     pub fn open(store: Store, backend: Backend, limits: &Limits) -> Result<Self, DrawError> {
         let renderer = Arc::new(Renderer::keeping(backend, limits.device_field_bytes)?);
-        let source = Arc::new(Source::new(
-            store.clone(),
-            Arc::clone(&renderer),
-            limits.field_bytes,
-        ));
+        let source = Source::new(store.clone(), Arc::clone(&renderer), limits.field_bytes);
+        let source = Arc::new(source.holding_whole(limits.whole_cells));
         let prefetch = Arc::new(Prefetch::new(
             store,
             Arc::clone(&source),

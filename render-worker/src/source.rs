@@ -11,14 +11,15 @@ use contract::key::ObjectKey;
 use contract::time_sample::{After, TimeSample};
 use quick_cache::Weighter;
 use quick_cache::sync::Cache;
+use render::Renderer;
 use render::field_cache::field_cache;
 use render::scene::{Cells, Field, Interval, Scene, Terrain};
 use render::stages::fill::Form;
 use render::stages::fill::scaled::holds;
-use render::{RenderError, Renderer};
 use storage::{StorageError, Store};
 
 use crate::error::DrawError;
+use crate::large::{Large, MOST_WHOLE_CELLS};
 
 /// Domains kept; each has four bytes a cell.
 const MOST_DOMAINS: usize = 64;
@@ -30,6 +31,10 @@ pub struct Source {
     renderer: Arc<Renderer>,
     most_bytes: u64,
     domains: Cache<ObjectKey, Arc<Cells<u32>>>,
+    /// Draws what is not held whole.
+    large: Large,
+    /// Fields of more cells are not.
+    most_whole_cells: u64,
     /// One reads a field, others who want it wait; if he gives up, the next one reads.
     fields: Cache<FieldKey, Held, ByBytes>,
     field_hits: AtomicU64,
@@ -111,6 +116,8 @@ impl Source {
     /// A source that keeps fields up to `most_bytes`, or two that are each larger than half of that and not larger than it.
     pub fn new(store: Store, renderer: Arc<Renderer>, most_bytes: u64) -> Self {
         Self {
+            large: Large::new(store.clone(), Arc::clone(&renderer)),
+            most_whole_cells: MOST_WHOLE_CELLS,
             store,
             renderer,
             most_bytes,
@@ -122,6 +129,18 @@ impl Source {
             early_hits: AtomicU64::new(0),
             early_cancelled: AtomicU64::new(0),
         }
+    }
+
+    /// The same with fields of more than so many cells not held whole.
+    #[must_use]
+    pub fn holding_whole(mut self, most_whole_cells: u64) -> Self {
+        self.most_whole_cells = most_whole_cells;
+        self
+    }
+
+    /// Is a field of this grid held whole?
+    pub(crate) fn is_held_whole(&self, grid: &Grid) -> bool {
+        grid.cell_count() as u64 <= self.most_whole_cells
     }
 
     /// Bytes of fields that are kept at most.
@@ -177,6 +196,10 @@ impl Source {
     /// The scene of a job without its trails.
     async fn scene_alone(&self, job: &RenderJob, wanted: Wanted) -> Result<Scene, DrawError> {
         let grid = &job.grid;
+        if !self.is_held_whole(grid) {
+            let terrain = self.any_terrain(job.relief.as_ref()).await?;
+            return Box::pin(self.large.scene(job, terrain)).await;
+        }
         let other = |sample| self.other_interval(grid, sample, wanted);
         let northward = job.flow.as_ref().map(|flow| &flow.northward);
         // All at once: a store that is far away is waited for once.
@@ -194,6 +217,7 @@ impl Source {
             terrain,
             northward,
             trails: None,
+            whole: None,
         })
     }
 
@@ -229,7 +253,7 @@ impl Source {
                 self.field_hits.fetch_add(1, Ordering::Relaxed);
                 // Found under its content, which says nothing of the grid of another job.
                 let fits = elevation.cells.content().len() == grid.cell_count();
-                let mismatch = || mismatch(&relief.field);
+                let mismatch = || DrawError::mismatch(&relief.field);
                 return fits
                     .then_some(Terrain { grid, elevation })
                     .ok_or_else(mismatch);
@@ -333,7 +357,7 @@ impl Source {
         if domain.content().len() == grid.cell_count() {
             return Ok(domain);
         }
-        Err(mismatch(key))
+        Err(DrawError::mismatch(key))
     }
 
     async fn field(
@@ -409,15 +433,6 @@ fn fill(
     }
     let filled = renderer.fill(Form::Window, grid, &values, domain)?;
     Ok(Field::filled(filled))
-}
-
-/// What is stored does not lie on the grid of the job.
-fn mismatch(key: &ObjectKey) -> DrawError {
-    let mismatch = RenderError::GridMismatch {
-        product: "the job".to_owned(),
-        accumulated: key.to_string(),
-    };
-    mismatch.into()
 }
 
 /// Named by the product, which a domain's folder is called after.

@@ -12,10 +12,11 @@ use std::sync::Arc;
 use contract::earth::Earth;
 use contract::grid::Grid;
 use contract::job::{Mode, RenderJob};
+use contract::level::WeightedMean;
 use rayon::prelude::*;
 
 use crate::plan::cell_px;
-use crate::scene::{Cells, Field, Interval, Scene, Terrain};
+use crate::scene::{Cells, Field, Interval, Scene, Terrain, Whole};
 use crate::stages::layout::{COVERED, is_missing};
 
 /// Cells smaller than this are joined, pixels: blocks then measure half a pixel to one.
@@ -57,11 +58,26 @@ fn suited_terrain(job: &RenderJob, terrain: &Terrain) -> Option<Terrain> {
     }
 }
 
-fn suited_product(job: &RenderJob, scene: &Scene) -> Option<Scene> {
-    let least_px = match job.mode {
+/// Cells of a mode that are smaller are joined, pixels.
+fn least_cell_px(mode: Mode) -> f64 {
+    match mode {
         Mode::Flow => LEAST_FLOW_CELL_PX,
         Mode::Map | Mode::Points | Mode::Sprites | Mode::Volume => LEAST_CELL_PX,
-    };
+    }
+}
+
+/// How often a grid is halved before a job is drawn on it, and what it becomes.
+pub fn halvings(job: &RenderJob, grid: &Grid) -> (u32, Grid) {
+    let (mut count, mut suited) = (0, *grid);
+    while cell_px(&job.view, &suited) < least_cell_px(job.mode) {
+        let Some(next) = halved(&suited) else { break };
+        (count, suited) = (count + 1, next);
+    }
+    (count, suited)
+}
+
+fn suited_product(job: &RenderJob, scene: &Scene) -> Option<Scene> {
+    let least_px = least_cell_px(job.mode);
     let mut suited: Option<Scene> = None;
     loop {
         let finest = suited.as_ref().unwrap_or(scene);
@@ -77,19 +93,7 @@ fn suited_product(job: &RenderJob, scene: &Scene) -> Option<Scene> {
 
 /// A grid of blocks of two by two cells, if such blocks fit the earth; where one row or column is left, of pairs.
 fn halved(fine: &Grid) -> Option<Grid> {
-    let joined = |count: u32, step_deg: f64| match count {
-        1 => (1, step_deg),
-        _ => (count.div_ceil(2), 2.0 * step_deg),
-    };
-    let (rows, dlat_deg) = joined(fine.rows, fine.dlat_deg);
-    let (cols, dlon_deg) = joined(fine.cols, fine.dlon_deg);
-    let grid = Grid {
-        rows,
-        cols,
-        dlat_deg,
-        dlon_deg,
-        ..*fine
-    };
+    let grid = fine.halved();
     // An odd number of columns all round, or of rows down to a pole, cannot be halved.
     let fits = grid.validate().is_ok() && (fine.rows >= 2 || fine.cols >= 2);
     fits.then_some(grid)
@@ -98,7 +102,19 @@ fn halved(fine: &Grid) -> Option<Grid> {
 /// The same scene in blocks of two by two cells, if such blocks fit the earth; its terrain stays as it is.
 pub fn coarser(scene: &Scene) -> Option<Scene> {
     let fine = &scene.grid;
-    let grid = halved(fine)?;
+    // Whether blocks fit is for all of a grid to say, so that windows of it are joined alike.
+    let whole = match &scene.whole {
+        Some(whole) => Some(Whole {
+            grid: halved(&whole.grid)?,
+            row: whole.row / 2,
+            col: whole.col / 2,
+        }),
+        None => None,
+    };
+    let grid = match whole {
+        Some(_) => fine.halved(),
+        None => halved(fine)?,
+    };
     let blocks = Blocks::new(fine, &grid, EARTH, Some(scene.domain.content()));
     let mean = |field: &Arc<Field>| field.coarser_mean(|cells| blocks.mean(cells));
     let mass = |field: &Arc<Field>| field.coarser_mass(|cells| blocks.mass(cells));
@@ -121,6 +137,7 @@ pub fn coarser(scene: &Scene) -> Option<Scene> {
             .as_ref()
             .map(|interval| both(interval, &mean)),
         trails: scene.trails.clone(),
+        whole,
     })
 }
 
@@ -194,18 +211,13 @@ impl<'a> Blocks<'a> {
     /// Means of what has a value, by covered area.
     fn mean(&self, values: &[f32]) -> Vec<f32> {
         self.each(|_, cells| {
-            let (mut sum, mut whole_m2) = (0.0, 0.0);
+            let mut mean = WeightedMean::default();
             for (cell, covered_m2) in cells {
                 if !is_missing(values[cell]) {
-                    sum += f64::from(values[cell]) * covered_m2;
-                    whole_m2 += covered_m2;
+                    mean.add(f64::from(values[cell]), covered_m2);
                 }
             }
-            if whole_m2 > 0.0 {
-                (sum / whole_m2) as f32
-            } else {
-                f32::NAN
-            }
+            mean.mean().map_or(f32::NAN, |mean| mean as f32)
         })
     }
 

@@ -73,6 +73,8 @@ pub struct Field {
     pub largest_error: f32,
     /// Smallest and largest value, 0 and 0 without data.
     pub range: [f32; 2],
+    /// Is it a part of a field, whose range and largest error these are?
+    is_part: bool,
     /// Means over blocks of four.
     coarser_mean: OnceLock<Arc<Field>>,
     /// What keeps the mass of blocks of four.
@@ -105,6 +107,7 @@ impl Field {
             errors: None,
             largest_error: 0.0,
             range: range.unwrap_or_default(),
+            is_part: false,
             coarser_mean: OnceLock::new(),
             coarser_mass: OnceLock::new(),
             lacking: None,
@@ -131,6 +134,33 @@ impl Field {
     /// A field of filled values and their estimated errors.
     pub fn filled(filled: Filled) -> Self {
         Self::new(filled.values).with_errors(filled.errors)
+    }
+
+    /// The same as a part of a field whose values lie in a range: slices and light are laid out for all of it.
+    #[must_use]
+    pub fn over(mut self, range: [f32; 2]) -> Self {
+        self.range = range;
+        self.is_part = true;
+        self
+    }
+
+    /// The same in coarser cells, as a part of the same field.
+    fn of_the_same(mut self, finer: &Self) -> Self {
+        if finer.is_part {
+            self.range = finer.range;
+            self.largest_error = finer.largest_error;
+            self.is_part = true;
+        }
+        self
+    }
+
+    /// The same with estimated errors of its values, as a part of a field whose largest one is known.
+    #[must_use]
+    pub fn with_errors_of(self, errors: Vec<f32>, largest_error: f32) -> Self {
+        let mut own = self.with_errors(errors);
+        own.largest_error = largest_error;
+        own.is_part = true;
+        own
     }
 
     fn with_errors(mut self, errors: Vec<f32>) -> Self {
@@ -178,13 +208,13 @@ impl Field {
             if let Some(lacking) = &self.lacking {
                 coarser = coarser.with_lacking(make(lacking));
             }
-            Arc::new(coarser)
+            Arc::new(coarser.of_the_same(self))
         };
         Arc::clone(self.coarser_mean.get_or_init(coarser))
     }
 
     pub(crate) fn coarser_mass(&self, make: impl FnOnce(&[f32]) -> Vec<f32>) -> Arc<Self> {
-        let coarser = || Arc::new(Self::new(make(&self.cells.content)));
+        let coarser = || Arc::new(Self::new(make(&self.cells.content)).of_the_same(self));
         Arc::clone(self.coarser_mass.get_or_init(coarser))
     }
 
@@ -264,9 +294,52 @@ pub struct Scene {
     pub northward: Option<Interval>,
     /// What the trails on the sea surface are drawn from: a flow on a grid of its own.
     pub trails: Option<Arc<Scene>>,
+    /// What the grid is a window of; none if it is all that the product has.
+    pub whole: Option<Whole>,
+}
+
+/// A grid that is too large to be held, and where a window of it begins. What must not depend on the window goes by it: random
+/// numbers, which blocks of cells are joined, and where a region ends.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Whole {
+    /// All of it.
+    pub grid: Grid,
+    /// First row of the window.
+    pub row: u32,
+    /// Its first column; the window may go on beyond the last one where the grid goes all the way round.
+    pub col: u32,
 }
 
 impl Scene {
+    /// A grid without content whose accumulated carbon lies in a range, to plan pictures of before anything is read.
+    pub(crate) fn unread(grid: Grid, carbon: Option<[f32; 2]>, whole: Option<Whole>) -> Self {
+        let still = |range| {
+            let field = Arc::new(Field::new(vec![]).over(range));
+            Interval {
+                before: Arc::clone(&field),
+                after: field,
+                weight: 0.0,
+            }
+        };
+        Self {
+            grid,
+            domain: Self::domain_of([]),
+            value: still([0.0; 2]),
+            accumulated: carbon.map(still),
+            terrain: None,
+            northward: None,
+            trails: None,
+            whole,
+        }
+    }
+
+    /// A domain of blocks of cells from how much of each holds data, of [`COVERED`].
+    pub fn domain_of_blocks(shares: Vec<u32>) -> Arc<Cells<u32>> {
+        let mut cells = Cells::new(shares);
+        cells.is_joined = true;
+        Arc::new(cells)
+    }
+
     /// A domain from one flag a cell.
     pub fn domain_of(cells: impl IntoIterator<Item = bool>) -> Arc<Cells<u32>> {
         let covered = |holds_data: bool| u32::from(holds_data) * COVERED;

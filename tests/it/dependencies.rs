@@ -38,7 +38,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     (
         "render-worker",
         &[
-            "contract", "legend", "retry", "storage", "service", "render",
+            "contract", "cube", "legend", "retry", "storage", "service", "render",
         ],
     ),
     ("render-proof", &["contract", "render", "synthetic"]),

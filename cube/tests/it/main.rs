@@ -6,6 +6,7 @@ mod damage;
 mod follow;
 mod frozen;
 mod kept;
+mod levels;
 mod migrate;
 mod plain;
 mod product;

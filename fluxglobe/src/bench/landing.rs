@@ -1,5 +1,5 @@
 //! `fluxglobe bench landing`: one frame landed into products of more and more steps: time, requests and bytes; and how long a
-//! window of 256 x 256 cells of it takes to read.
+//! window of 256 x 256 cells of it, and of its first coarser level, takes to read.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -9,10 +9,11 @@ use anyhow::{Context as _, Result, ensure};
 use comfy_table::Table;
 use comfy_table::presets::NOTHING;
 use contract::chunk::Window;
+use contract::grid::Grid;
 use contract::manifest::{Manifest, Step};
 use contract::product::ProductId;
 use contract::time::{Period, TimeMs};
-use cube::{At, Repository};
+use cube::{At, Cube, Repository};
 use ingest::{GeneratedSteps, IngestService};
 use serde::Serialize;
 use storage::log::EmbeddedLog;
@@ -50,6 +51,8 @@ struct Row {
     background_bytes: u64,
     /// A window of the frame: the first one of a process, and the median of others elsewhere, ms.
     window_ms: [f64; 2],
+    /// The same of the first coarser level, median of all; none of a grid without levels.
+    level_window_ms: Option<f64>,
 }
 
 pub(crate) async fn run(options: &BenchLanding) -> Result<()> {
@@ -168,6 +171,7 @@ async fn landed(
     let manifest = newest.context("what landed has a version")?;
     let frame = manifest.steps.last().context("it has steps")?;
     let frame_bytes = store.size_bytes(&frame.field).await?;
+    let (window_ms, level_window_ms) = windows(store, &manifest).await?;
     Ok(Row {
         steps,
         is_revision,
@@ -178,23 +182,38 @@ async fn landed(
         read_bytes: own.read_bytes,
         background_seconds: all - seconds,
         background_bytes: behind,
-        window_ms: windows(store, &manifest).await?,
+        window_ms,
+        level_window_ms,
     })
 }
 
-/// Reads windows of the newest step, spread over the grid: the first, its cube opened, and the median of the others, ms.
-async fn windows(store: &Store, manifest: &Manifest) -> Result<[f64; 2]> {
+/// Reads windows of the newest step, spread over the grid: the first, its cube opened, and the median of the others, ms; and the
+/// median of those of the first coarser level.
+async fn windows(store: &Store, manifest: &Manifest) -> Result<([f64; 2], Option<f64>)> {
     let (fresh, _traffic) = store.counted();
-    let grid = &manifest.grid;
+    let begun = Instant::now();
+    let repository = Repository::open(&fresh, &cube::folder(&manifest.product)).await?;
+    let cube = repository.at(&At::Newest).await?;
+    let opened_ms = begun.elapsed().as_secs_f64() * 1e3;
     let step = manifest.steps.len() - 1;
+    let mut took = windows_of(&cube, step, 0, &manifest.grid).await?;
+    let first_ms = opened_ms + took.remove(0);
+    took.sort_by(f64::total_cmp);
+    let of_cells = [first_ms, super::quantile(&took, 0.5)];
+    let Some(level) = cube.levels().next().copied() else {
+        return Ok((of_cells, None));
+    };
+    let mut took = windows_of(&cube, step, level.number, &level.grid).await?;
+    took.sort_by(f64::total_cmp);
+    Ok((of_cells, Some(super::quantile(&took, 0.5))))
+}
+
+/// How long each of some windows of a level took to read, ms.
+async fn windows_of(cube: &Cube, step: usize, level: u32, grid: &Grid) -> Result<Vec<f64>> {
     let [rows, cols] = [grid.rows, grid.cols].map(|side| side.min(WINDOW_CELLS));
     // Shares of the golden section lie far from each other.
     let place = |at: u32, of: u32| (f64::from(at) * 0.618_034).fract() * f64::from(of);
     let mut took = vec![];
-    let begun = Instant::now();
-    let repository = Repository::open(&fresh, &cube::folder(&manifest.product)).await?;
-    let cube = repository.at(&At::Newest).await?;
-    let mut first_ms = begun.elapsed().as_secs_f64() * 1e3;
     for at in 0..WINDOWS {
         let window = Window {
             row: place(at + 1, grid.rows - rows) as u32,
@@ -203,13 +222,15 @@ async fn windows(store: &Store, manifest: &Manifest) -> Result<[f64; 2]> {
             cols,
         };
         let begun = Instant::now();
-        let values = cube.window(step, window).await?;
-        ensure!(values.len() == window.cell_count(), "a window lacks cells");
+        let found = cube.window_at(level, window, step).await?;
+        let found = found.context("what landed has levels")?;
+        ensure!(
+            found.values.len() == window.cell_count(),
+            "a window lacks cells"
+        );
         took.push(begun.elapsed().as_secs_f64() * 1e3);
     }
-    first_ms += took.remove(0);
-    took.sort_by(f64::total_cmp);
-    Ok([first_ms, super::quantile(&took, 0.5)])
+    Ok(took)
 }
 
 fn table(rows: &[Row]) -> Table {
@@ -227,6 +248,7 @@ fn table(rows: &[Row]) -> Table {
         "MB",
         "window ms",
         "again ms",
+        "level ms",
     ]);
     let mb = |bytes: u64| format!("{:.2}", bytes as f64 / 1e6);
     for row in rows {
@@ -247,6 +269,8 @@ fn table(rows: &[Row]) -> Table {
             mb(row.background_bytes),
             format!("{:.1}", row.window_ms[0]),
             format!("{:.1}", row.window_ms[1]),
+            row.level_window_ms
+                .map_or_else(String::new, |ms| format!("{ms:.1}")),
         ]);
     }
     table

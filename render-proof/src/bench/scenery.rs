@@ -157,6 +157,7 @@ pub fn scene(grid: &Grid) -> Scene {
         terrain: None,
         northward: None,
         trails: None,
+        whole: None,
     }
 }
 
@@ -198,6 +199,7 @@ pub fn pole(cells: u64, size_px: [u32; 2]) -> Result<(Scene, RenderJob)> {
         terrain: None,
         northward: None,
         trails: None,
+        whole: None,
     };
     let mut job = job(size_px, 64, 0.0)?;
     job.accumulated = None;

@@ -41,6 +41,7 @@ fn even_sea() -> Scene {
         terrain: None,
         northward: None,
         trails: None,
+        whole: None,
     }
 }
 

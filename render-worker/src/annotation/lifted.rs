@@ -31,7 +31,8 @@ struct Wanted<'a> {
 impl Lifted {
     /// Of a loaded scene; nothing where the job has no height bar.
     pub fn of(job: &RenderJob, scene: &Scene) -> Self {
-        let (Some(wanted), Some(carbon)) = (Wanted::of(job), &scene.accumulated) else {
+        let (Some(wanted), Some(carbon)) = (Wanted::of(job, &scene.grid), &scene.accumulated)
+        else {
             return Self::default();
         };
         let [before, after] = [&carbon.before, &carbon.after].map(|field| field.cells.content());
@@ -41,12 +42,12 @@ impl Lifted {
 }
 
 impl<'a> Wanted<'a> {
-    fn of(job: &'a RenderJob) -> Option<Self> {
+    fn of(job: &'a RenderJob, grid: &'a Grid) -> Option<Self> {
         job.annotations.as_ref()?.height?;
         Some(Self {
             projection: Projection::of(&job.view)?,
             size: job.view.size_px().map(f64::from),
-            grid: &job.grid,
+            grid,
             m_per_kg_m2: job.style.height_m_per_kg_m2,
         })
     }

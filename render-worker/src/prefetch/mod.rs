@@ -138,6 +138,10 @@ impl Reader {
             job.trails.as_ref().map(|trails| &trails.eastward),
             job.trails.as_ref().map(|trails| &trails.flow.northward),
         ];
+        if !self.source.is_held_whole(&job.grid) {
+            // Windows of it are read quickly, and another picture shows another one.
+            return Ok(());
+        }
         let layer = parts[..3].iter().flatten().count() * job.grid.cell_count();
         let vector = job.trails.as_ref();
         let vector = vector.map_or(0, |trails| 2 * trails.grid.cell_count());

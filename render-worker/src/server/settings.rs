@@ -59,6 +59,7 @@ impl Settings {
             field_bytes: u64::from(self.field_memory_mib) << 20,
             device_field_bytes: self.device_field_memory_mib.map(|mib| u64::from(mib) << 20),
             fields_ahead: usize::from(self.fields_ahead),
+            ..Limits::default()
         }
     }
 

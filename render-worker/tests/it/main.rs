@@ -15,6 +15,7 @@ mod frozen;
 mod gallery;
 mod here;
 mod incomplete;
+mod large;
 mod loading;
 mod lost_device;
 mod parts;

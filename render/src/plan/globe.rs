@@ -83,14 +83,22 @@ pub(super) fn plan(plan: &mut Plan, job: &RenderJob, scene: &Scene) {
     let widest_px = NEAREST_OVER_FARTHEST * radius_px + 16.0;
     params.projection.max_radius_px = widest_px as f32;
     params.lists.entry_shift = entry_shift(widest_px);
-    plan.rows = rows(scene, &look, &camera, particles, job.style.optical_depth);
+    let style_depth = job.style.optical_depth;
+    let rows_of = |grid: &Grid| rows(grid, &look, &camera, particles, style_depth);
+    plan.rows = rows_of(grid);
+    plan.whole_rows = scene
+        .whole
+        .iter()
+        .flat_map(|it| rows_of(&it.grid))
+        .collect();
     let heights = height_range_m(job, scene).map(|height_m| height_m / SPHERE_RADIUS_M);
     let radius = radius_px / camera.focal_px * camera.nearest;
     // From a cell's middle to its corner, and from there as far as its particles drift.
     let half_cell = (grid.dlon_deg.hypot(grid.dlat_deg) / 2.0).to_radians();
     let margin = radius + half_cell + flow::plan(plan, job, scene);
     let footprint = camera.footprint(job, heights, margin);
-    let extent = Extent::of(grid, heights);
+    let all = scene.whole.as_ref().map_or(grid, |whole| &whole.grid);
+    let extent = Extent::of(all, heights);
     let cap = |angle| Cap {
         heights,
         center: footprint.center,
@@ -145,8 +153,7 @@ fn interpolate_rows(plan: &mut Plan, grid: &Grid, footprint: &Footprint) {
     };
 }
 
-fn rows(scene: &Scene, look: &Look, camera: &Camera, particles: f64, style_depth: f64) -> Vec<Row> {
-    let grid = &scene.grid;
+fn rows(grid: &Grid, look: &Look, camera: &Camera, particles: f64, style_depth: f64) -> Vec<Row> {
     (0..grid.rows)
         .map(|row| {
             let (north, south) = (
@@ -163,7 +170,7 @@ fn rows(scene: &Scene, look: &Look, camera: &Camera, particles: f64, style_depth
                 cos_lat: lat.cos() as f32,
                 lat_span_rad: (north - south) as f32,
                 radius: radius as f32,
-                area_m2: area_m2(scene, row),
+                area_m2: area_m2(grid, row),
                 depth_gain: look.depth_gain(area, radius, particles, style_depth) as f32,
                 ..Row::default()
             }
@@ -336,6 +343,35 @@ fn half_width(center: DVec3, angle: f64) -> f64 {
     }
     // A little more, so that what is on the edge is left to the test of the cap.
     (angle.sin() / lat.cos()).clamp(0.0, 1.0).asin() + 1e-3
+}
+
+/// Rows and columns that a planned picture can show something of.
+pub(super) fn seen(plan: &Plan, job: &RenderJob, grid: &Grid) -> [Vec<u32>; 2] {
+    /// What single precision may put a place beside itself, radians.
+    const SLACK: f64 = 1e-3;
+    let (rows, center, angle) = if plan.mode == Mode::Map {
+        let Some(camera) = Camera::of(&job.view) else {
+            return [vec![], vec![]];
+        };
+        let shown = plan.params.interpolation;
+        let footprint = camera.footprint(job, [0.0; 2], 3.0 * grid.dlat_deg.to_radians());
+        let rows = shown.first_cell / grid.cols..shown.end_cell / grid.cols;
+        (rows, footprint.center, footprint.seen)
+    } else {
+        let (cells, view) = (&plan.params.cells, &plan.params.view);
+        let cap = view.cap.as_dvec3();
+        let cosine = f64::from(view.cap_least) / cap.length();
+        let angle = cosine.clamp(-1.0, 1.0).acos();
+        let rows = cells.first_row..cells.first_row + cells.row_count;
+        (rows, cap.normalize_or_zero(), angle)
+    };
+    let across = half_width(center, angle + SLACK) + grid.dlon_deg.to_radians();
+    let middle = center.x.atan2(center.y);
+    let is_near = |col: &u32| {
+        let lon = (grid.col_west_deg(*col) + 0.5 * grid.dlon_deg).to_radians();
+        ((lon - middle + PI).rem_euclid(TAU) - PI).abs() <= across
+    };
+    [rows.collect(), (0..grid.cols).filter(is_near).collect()]
 }
 
 /// Fills the table of columns and sets the rows and the cap that are drawn.

@@ -20,6 +20,7 @@ mod shape;
 mod tile;
 mod trails;
 
+use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -78,6 +79,8 @@ pub struct Plan {
     pub mode: Mode,
     pub params: Params,
     pub rows: Vec<Row>,
+    /// Those of the grid that this one is a window of; empty of one that is all there is.
+    whole_rows: Vec<Row>,
     pub cols: Vec<Col>,
     /// The cells to draw, listed for the twins; devices find them by themselves.
     pub active: Vec<Active>,
@@ -193,6 +196,7 @@ impl Plan {
             mode: job.mode,
             params: common(job, scene),
             rows: vec![],
+            whole_rows: vec![],
             cols: vec![],
             active: vec![],
             axes: vec![],
@@ -217,13 +221,38 @@ impl Plan {
     /// neighbours round alike.
     fn choose_units(&mut self, job: &RenderJob) {
         let style_depth = job.style.optical_depth;
-        let gain = self.rows.iter().map(|row| f64::from(row.depth_gain));
+        let gain = self.all_rows().iter().map(|row| f64::from(row.depth_gain));
         let gain = gain.fold(0.0, f64::max);
         let thinnest = 1.0 - f64::from(self.params.projection.size_spread);
         let params = &mut self.params;
         params.lighting.depth_one = look::light_one(style_depth);
         params.lists.depth_one =
             look::eye_one(style_depth * gain * MOST_ENVELOPE / (thinnest * thinnest).max(1e-3));
+    }
+
+    /// Rows of all of the grid, whichever window of it is drawn.
+    fn all_rows(&self) -> &[Row] {
+        match &self.whole_rows[..] {
+            [] => &self.rows,
+            whole => whole,
+        }
+    }
+
+    /// Rows and columns of a grid that a picture can show something of; columns may go on beyond the last one where the grid goes
+    /// all the way round. `carbon` is the range of what is accumulated, if anything is. None where it shows nothing of it.
+    pub fn seen_cells(
+        job: &RenderJob,
+        grid: &Grid,
+        carbon: Option<[f32; 2]>,
+    ) -> Option<[Range<u32>; 2]> {
+        let plan = Self::viewed(job, &Scene::unread(*grid, carbon, None));
+        let [rows, cols] = match job.view {
+            View::Tile { size_px, .. } => tile::seen(&plan, grid, size_px),
+            View::Globe { .. } => globe::seen(&plan, job, grid),
+        };
+        let cols = covering(cols, grid)?;
+        let (first, last) = (rows.first()?, rows.last()?);
+        Some([*first..last + 1, cols])
     }
 
     fn count_particles(&mut self, most_buffer_bytes: u64) -> Result<(), RenderError> {
@@ -295,6 +324,22 @@ impl Plan {
     }
 }
 
+/// The fewest columns side by side that hold all of these.
+fn covering(mut cols: Vec<u32>, grid: &Grid) -> Option<Range<u32>> {
+    cols.sort_unstable();
+    cols.dedup();
+    let (first, last) = (*cols.first()?, *cols.last()?);
+    if !grid.is_periodic() {
+        return Some(first..last + 1);
+    }
+    // Behind each the next one, behind the last the first of the next turn.
+    let next = cols.iter().skip(1).copied().chain([first + grid.cols]);
+    let gaps = cols.iter().zip(next).map(|(own, next)| (next - own, next));
+    let (gap, start) = gaps.max_by_key(|(gap, start)| (*gap, std::cmp::Reverse(*start)))?;
+    let start = start % grid.cols;
+    Some(start..start + grid.cols + 1 - gap)
+}
+
 /// Side of a grid's cells in a view, pixels: at the equator of a tile's level, where a globe view's ground is nearest.
 pub fn cell_px(view: &View, grid: &Grid) -> f64 {
     let cell_deg = (grid.dlon_deg * grid.dlat_deg).sqrt();
@@ -321,7 +366,7 @@ fn common(job: &RenderJob, scene: &Scene) -> Params {
             hides: 1.0,
             ..ViewParams::default()
         },
-        grid: GridParams::whole(grid),
+        grid: GridParams::whole(grid).window_of(scene.whole.as_ref()),
         values: ValueParams {
             weight: weight(&scene.value),
             accumulated_weight: scene.accumulated.as_ref().map_or(0.0, weight),
@@ -447,6 +492,6 @@ fn is_in_cap(params: &Params, row: &Row, col: &Col) -> bool {
 }
 
 /// Area of the cells of every row, m².
-fn area_m2(scene: &Scene, row: u32) -> f32 {
-    scene.grid.cell_area_m2(row, Earth::Wgs84) as f32
+fn area_m2(grid: &Grid, row: u32) -> f32 {
+    grid.cell_area_m2(row, Earth::Wgs84) as f32
 }

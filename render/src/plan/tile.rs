@@ -60,14 +60,14 @@ pub(super) fn plan(plan: &mut Plan, job: &RenderJob, scene: &Scene, (tile, size_
     let cell_px = cell_px(&job.view, grid);
     let particles = look.particles_per_cell(cell_px, job.style.particles_per_cell);
     plan.params.cells.set_particles(particles);
-    plan.rows = rows(
-        scene,
-        &level,
-        &look,
-        col_px,
-        particles,
-        job.style.optical_depth,
-    );
+    let style_depth = job.style.optical_depth;
+    let rows_of = |grid: &Grid| rows(grid, &level, &look, col_px, (particles, style_depth));
+    plan.rows = rows_of(grid);
+    plan.whole_rows = scene
+        .whole
+        .iter()
+        .flat_map(|it| rows_of(&it.grid))
+        .collect();
     let heights_m = height_range_m(job, scene);
     let highest_m = heights_m[1].max(-heights_m[0]);
     let flattened = kept_share(level.px_per_m, highest_m);
@@ -124,30 +124,24 @@ fn upstream(spans: [Span; 2], level: &Level, reach_rad: f64) -> [Span; 2] {
 }
 
 fn rows(
-    scene: &Scene,
+    grid: &Grid,
     level: &Level,
     look: &Look,
     col_px: f64,
-    particles: f64,
-    style_depth: f64,
+    (particles, style_depth): (f64, f64),
 ) -> Vec<Row> {
     let subpixels = f64::from(SUBPIXELS);
     let edge_px = |row: u32| {
-        mercator_y(
-            scene
-                .grid
-                .row_north_deg(row)
-                .clamp(-MAX_LAT_DEG, MAX_LAT_DEG),
-        ) * level.world_px
-            - level.origin_px[1]
+        let lat_deg = grid.row_north_deg(row).clamp(-MAX_LAT_DEG, MAX_LAT_DEG);
+        mercator_y(lat_deg) * level.world_px - level.origin_px[1]
     };
-    (0..scene.grid.rows)
+    (0..grid.rows)
         .map(|row| {
             let (north, south) = (edge_px(row), edge_px(row + 1));
             let height = (south - north).max(1e-6);
             let area_px = height * col_px;
             let [north_rad, south_rad] =
-                [row, row + 1].map(|row| scene.grid.row_north_deg(row).to_radians());
+                [row, row + 1].map(|row| grid.row_north_deg(row).to_radians());
             let (sin_lat, cos_lat) = (0.5 * (north_rad + south_rad)).sin_cos();
             let radius = look.radius_px(Look::side(col_px, height), particles);
             // Rows far from the tile do not fit; they are never chosen.
@@ -159,7 +153,7 @@ fn rows(
                 cos_lat: cos_lat as f32,
                 lat_span_rad: (north_rad - south_rad) as f32,
                 radius: radius as f32,
-                area_m2: area_m2(scene, row),
+                area_m2: area_m2(grid, row),
                 depth_gain: look.depth_gain(area_px, radius, particles, style_depth) as f32,
             }
         })
@@ -204,7 +198,7 @@ fn light_and_reach(
 ) -> [Span; 2] {
     let subpixels = f64::from(SUBPIXELS);
     let widest = plan
-        .rows
+        .all_rows()
         .iter()
         .map(|row| f64::from(row.radius))
         .fold(0.0, f64::max)
@@ -304,6 +298,32 @@ fn choose_cells(plan: &mut Plan, scene: &Scene, level: &Level, spans: [Span; 2])
     cells.first_row = chosen.first().copied().unwrap_or(0);
     cells.row_count = chosen.last().map_or(0, |row| row + 1) - cells.first_row;
     cells.slot_count = plan.cols.len() as u32;
+}
+
+/// Rows and columns that a planned tile can show something of.
+pub(super) fn seen(plan: &Plan, grid: &Grid, size_px: u32) -> [Vec<u32>; 2] {
+    if plan.mode != Mode::Map {
+        let cells = &plan.params.cells;
+        let rows = cells.first_row..cells.first_row + cells.row_count;
+        let cols = plan.cols.iter().map(|col| col.index);
+        return [rows.collect(), cols.collect()];
+    }
+    let shown = plan.params.interpolation;
+    let rows = shown.first_cell / grid.cols..shown.end_cell / grid.cols;
+    let pixels = plan.axes.iter().take(size_px as usize);
+    // Isolines look one column farther than values between centres of cells.
+    let near = pixels.flat_map(|axis| axis.index - 1..=axis.index + 2);
+    let cols = i64::from(grid.cols);
+    let col = |col: i32| {
+        let col = i64::from(col);
+        let col = if grid.is_periodic() {
+            col.rem_euclid(cols)
+        } else {
+            col
+        };
+        (0..cols).contains(&col).then_some(col as u32)
+    };
+    [rows.collect(), near.filter_map(col).collect()]
 }
 
 fn interpolate_rows(plan: &mut Plan, rows: Range<u32>) {

@@ -6,6 +6,7 @@ use glam::{IVec2, UVec2, Vec2, Vec3};
 
 use crate::gpu::packed;
 use crate::passes::cells::CellParams;
+use crate::scene::Whole;
 pub use crate::shared_struct::Fields;
 use crate::stages::bin::params::ListParams;
 use crate::stages::compose::base_map::BaseMapParams;
@@ -77,10 +78,37 @@ shared_struct! {
         /// Cells that the buffers of fields hold, the first and the end: all unless a field is too large to be held whole.
         pub held_first_cell: u32,
         pub held_end_cell: u32,
+        /// Where it begins in the grid that it is a window of, and how many columns that has: random numbers are of cells there.
+        pub whole_row: u32,
+        pub whole_col: u32,
+        pub whole_cols: u32,
     }
 }
 
 impl GridParams {
+    /// The same of a window of a larger grid.
+    #[must_use]
+    pub fn window_of(self, whole: Option<&Whole>) -> Self {
+        let Some(whole) = whole else { return self };
+        Self {
+            whole_row: whole.row,
+            whole_col: whole.col,
+            whole_cols: whole.grid.cols,
+            ..self
+        }
+    }
+
+    /// Row and column of a cell in the grid that this is a window of, which may go on beyond its last column.
+    pub fn in_whole(&self, row: u32, col: u32) -> [u32; 2] {
+        let col = self.whole_col + col;
+        let turn = if col >= self.whole_cols {
+            self.whole_cols
+        } else {
+            0
+        };
+        [self.whole_row + row, col - turn]
+    }
+
     /// A grid whose fields are held whole.
     pub fn whole(grid: &Grid) -> Self {
         Self {
@@ -93,6 +121,9 @@ impl GridParams {
             rows_per_rad: (1.0 / grid.dlat_deg.to_radians()) as f32,
             held_first_cell: 0,
             held_end_cell: grid.cell_count() as u32,
+            whole_row: 0,
+            whole_col: 0,
+            whole_cols: grid.cols,
         }
     }
 }

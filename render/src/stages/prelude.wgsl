@@ -14,7 +14,7 @@ struct ViewParams {
 
 struct GridParams {
     rows: u32, cols: u32, periodic: u32, west_rad: f32, north_rad: f32, cols_per_rad: f32, rows_per_rad: f32,
-    held_first_cell: u32, held_end_cell: u32,
+    held_first_cell: u32, held_end_cell: u32, whole_row: u32, whole_col: u32, whole_cols: u32,
 }
 @group(0) @binding(17) var<uniform> grid: GridParams;
 

@@ -53,6 +53,7 @@ fn world(grid: &Grid) -> Scene {
         terrain: None,
         northward: None,
         trails: None,
+        whole: None,
     }
 }
 

@@ -28,6 +28,7 @@ fn constant(grid: Grid, value: f32) -> Scene {
         terrain: None,
         northward: None,
         trails: None,
+        whole: None,
     }
 }
 

@@ -444,6 +444,7 @@ fn a_sea_of_full_flux_has_the_optical_depth_of_the_style() {
         terrain: None,
         northward: None,
         trails: None,
+        whole: None,
     };
     for renderer in renderers("optical depth") {
         for (z, x, y) in [(3, 1, 3), (5, 7, 12), (6, 12, 28)] {
@@ -491,6 +492,7 @@ fn quarter_sea() -> [Scene; 2] {
         terrain: None,
         northward: None,
         trails: None,
+        whole: None,
     };
     let blocks = coarser(&scene).unwrap();
     [scene, blocks]

@@ -210,7 +210,9 @@ impl VectorField<'_> {
         if is_missing(self.velocity[cell as usize].east) {
             return trail;
         }
-        let bits = hash(hash(cell) ^ number.wrapping_mul(0x9e3779b9));
+        let [row, col] = params.grid.in_whole(trail.row, trail.col);
+        let whole_cell = row.wrapping_mul(params.grid.whole_cols).wrapping_add(col);
+        let bits = hash(hash(whole_cell) ^ number.wrapping_mul(0x9e3779b9));
         let turn = unit(bits) + params.flow.turn;
         trail.age = turn - turn.floor();
         let cycle = params.flow.cycle.wrapping_add(turn as u32);

@@ -64,7 +64,8 @@ fn trail_of(row: u32, slot: u32, number: u32) -> Trail {
     trail.col = cols[slot].index;
     let cell = row * grid.cols + trail.col;
     if (is_missing(velocity[cell].east)) { return trail; }
-    let bits = hash(hash(cell) ^ (number * 0x9e3779b9u));
+    let place_in_whole = in_whole(row, trail.col);
+    let bits = hash(hash(place_in_whole.x * grid.whole_cols + place_in_whole.y) ^ (number * 0x9e3779b9u));
     let turn = unit(bits) + flow.turn;
     trail.age = turn - floor(turn);
     // Every life begins somewhere else.

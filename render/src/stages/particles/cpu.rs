@@ -81,17 +81,21 @@ pub fn generate(params: &Params, inputs: &Inputs<'_>, particles: &mut [Particle]
 
 fn one(params: &Params, inputs: &Inputs<'_>, cell: Active, k: u32) -> Particle {
     let (own, values) = (&params.particles, &params.values);
-    let row = cell.cell / params.grid.cols;
+    let (row, col) = (cell.cell / params.grid.cols, cell.cell % params.grid.cols);
+    let [whole_row, whole_col] = params.grid.in_whole(row, col);
     let value = inputs.value[cell.cell as usize];
-    let bits = hash(hash(cell.cell) ^ k.wrapping_mul(0x9e3779b9));
+    let whole_cell = whole_row
+        .wrapping_mul(params.grid.whole_cols)
+        .wrapping_add(whole_col);
+    let bits = hash(hash(whole_cell) ^ k.wrapping_mul(0x9e3779b9));
     let along = |step: u32, bits: u32| {
         HALF_TURN
             .wrapping_add(k.wrapping_mul(step))
             .wrapping_add(jittered(params, bits))
     };
     let (east, south) = (along(3242174889, bits), along(2447445414, hash(bits)));
-    let across = (cell.cell % params.grid.cols).wrapping_mul(2447445414);
-    let start = row
+    let across = whole_col.wrapping_mul(2447445414);
+    let start = whole_row
         .wrapping_mul(3242174889)
         .wrapping_add(k.wrapping_mul(2654435769))
         .wrapping_add(across);

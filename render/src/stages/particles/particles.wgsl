@@ -43,16 +43,21 @@ fn through_water(colour: u32, depth_m: f32) -> u32 {
     return with_codes(colour, sqrt(water + (codes * codes - water) * kept));
 }
 
+// Row and column of a cell in the grid that this is a window of, which may go on beyond its last column.
+fn in_whole(row: u32, col: u32) -> vec2<u32> {
+    let own = grid.whole_col + col;
+    return vec2(grid.whole_row + row, select(own, own - grid.whole_cols, own >= grid.whole_cols));
+}
+
 // Particle `k` of a cell with data; `slot` is its column in the table, `carbon` what it has accumulated, kg m-2.
 fn particle_of(row: u32, slot: u32, k: u32, value: f32, carbon: f32) -> Particle {
-    let col = cols[slot].index;
-    let cell = row * grid.cols + col;
-    let bits = hash(hash(cell) ^ (k * 0x9e3779b9u));
+    let place_in_whole = in_whole(row, cols[slot].index);
+    let bits = hash(hash(place_in_whole.x * grid.whole_cols + place_in_whole.y) ^ (k * 0x9e3779b9u));
     // An additive sequence (R2, Roberts 2018) round the cell's centre, jittered by random numbers: little for clouds,
     // which then cover the sea evenly, wholly for dots, which must not stand in rows. Golden sections up the column; from
     // cell to cell the same sequence again, so that those that are thin at an instant lie apart.
     let place = vec2(HALF_TURN) + k * vec2(3242174889u, 2447445414u);
-    let start = row * 3242174889u + col * 2447445414u + k * 2654435769u;
+    let start = place_in_whole.x * 3242174889u + place_in_whole.y * 2447445414u + k * 2654435769u;
     var particle: Particle;
     particle.row = row;
     particle.slot = slot;

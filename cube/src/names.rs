@@ -1,0 +1,72 @@
+//! Digests along an axis, in chunks of an array: what runs, or levels of steps, were made of, and none where there is nothing.
+
+use std::sync::Arc;
+
+use contract::digest::Digest;
+use zarrs::storage::{AsyncReadableStorageTraits, AsyncWritableStorageTraits};
+
+use crate::arrays::{self, DIGEST_BYTES, DIGEST_CHUNK, Definition};
+use crate::error::first_lines;
+use crate::{CubeError, axis};
+
+/// Reads all of them.
+pub(crate) async fn read<S>(
+    store: &Arc<S>,
+    definition: &Definition,
+    place: &str,
+) -> Result<Vec<Option<Digest>>, CubeError>
+where
+    S: AsyncReadableStorageTraits + 'static,
+{
+    let array = axis::open(store, definition, place).await?;
+    let count = array.shape()[0];
+    let chunk_bytes = (DIGEST_CHUNK * DIGEST_BYTES) as usize;
+    let mut bytes: Vec<u8> = vec![];
+    for chunk in 0..count.div_ceil(DIGEST_CHUNK) {
+        let index = [chunk, 0];
+        let found = array.async_retrieve_chunk_if_exists::<Vec<u8>>(&index);
+        let found = found.await.map_err(|e| CubeError::Chunk {
+            array: arrays::name(&array),
+            chunk: index.to_vec(),
+            reason: first_lines(&e),
+        })?;
+        // One of zeros alone is not stored.
+        bytes.extend(found.unwrap_or_else(|| vec![0; chunk_bytes]));
+    }
+    bytes.truncate((count * DIGEST_BYTES) as usize);
+    let digest = |bytes: &[u8]| {
+        let bytes: [u8; DIGEST_BYTES as usize] = bytes.try_into().unwrap_or_default();
+        let is_there = bytes.iter().any(|byte| *byte != 0);
+        is_there.then(|| Digest::from_bytes(bytes))
+    };
+    let chunks = bytes.chunks_exact(DIGEST_BYTES as usize);
+    Ok(chunks.map(digest).collect())
+}
+
+/// Writes those from one on, and how many there are.
+pub(crate) async fn write<S>(
+    store: &Arc<S>,
+    definition: Definition,
+    names: &[Option<Digest>],
+    first: usize,
+) -> Result<(), CubeError>
+where
+    S: AsyncWritableStorageTraits + 'static,
+{
+    let array = definition.with_storage(Arc::clone(store));
+    let failed = |e: String| CubeError::library(&arrays::name(&array), "writing", e);
+    let stored = array.async_store_metadata().await;
+    stored.map_err(|e| failed(e.to_string()))?;
+    let in_chunk = DIGEST_CHUNK as usize;
+    for (chunk, names) in names.chunks(in_chunk).enumerate().skip(first / in_chunk) {
+        let bytes = names.iter().flat_map(|name| match name {
+            Some(name) => *name.as_bytes(),
+            None => [0; DIGEST_BYTES as usize],
+        });
+        let mut bytes: Vec<u8> = bytes.collect();
+        bytes.resize((DIGEST_CHUNK * DIGEST_BYTES) as usize, 0);
+        let stored = array.async_store_chunk(&[chunk as u64, 0], bytes).await;
+        stored.map_err(|e| failed(e.to_string()))?;
+    }
+    Ok(())
+}
