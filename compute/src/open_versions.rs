@@ -18,6 +18,11 @@ impl OpenVersions {
         Self(Cache::new(VERSIONS))
     }
 
+    /// Values of a version, if they are held.
+    pub(crate) fn held(&self, id: &ManifestId) -> Option<Values> {
+        self.0.get(id)
+    }
+
     /// Values of a version, opened now if they are not held.
     pub(crate) async fn values(
         &self,
@@ -25,7 +30,7 @@ impl OpenVersions {
         manifest: &Manifest,
         id: &ManifestId,
     ) -> Result<Values, CubeError> {
-        if let Some(values) = self.0.get(id) {
+        if let Some(values) = self.held(id) {
             return Ok(values);
         }
         let values = Values::of(store, &Arc::new(manifest.clone())).await?;
