@@ -52,3 +52,9 @@ impl OpenVersions {
         self.0.remove(id).is_some()
     }
 }
+
+impl std::fmt::Debug for OpenVersions {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} open versions", self.0.len())
+    }
+}

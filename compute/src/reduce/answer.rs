@@ -194,7 +194,7 @@ impl Reduction<'_> {
         if !pieces.is_empty() {
             let values = Some(self.values.clone());
             let Some(found) = run(self.engine, question.clone(), values, pieces).await? else {
-                return self.from_fields(version, question).await;
+                return self.of_fields_alone(version, question).await;
             };
             all.merge(found)?;
         }
@@ -207,7 +207,7 @@ impl Reduction<'_> {
     }
 
     /// The same of fields alone, which never change.
-    async fn from_fields(
+    async fn of_fields_alone(
         &self,
         version: Version<'_>,
         question: Question,

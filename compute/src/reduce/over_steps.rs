@@ -82,16 +82,15 @@ pub(crate) async fn sums_over_region(
         };
         let along_time = pieces(version);
         let along_time = run(engine, question.clone(), Some(values.clone()), along_time);
-        let found = match along_time.await? {
-            Some(found) => found,
-            None => {
-                let fields = Version {
-                    values: None,
-                    ..version
-                };
-                let found = run(engine, question.clone(), None, pieces(fields)).await?;
-                found.ok_or_else(changed_meanwhile)?
-            }
+        let found = if let Some(found) = along_time.await? {
+            found
+        } else {
+            let fields = Version {
+                values: None,
+                ..version
+            };
+            let found = run(engine, question.clone(), None, pieces(fields)).await?;
+            found.ok_or_else(changed_meanwhile)?
         };
         let mut found = found.regions;
         for step in asked {

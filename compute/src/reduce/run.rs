@@ -34,7 +34,10 @@ pub(super) async fn run(
 
 /// Fields are always there.
 pub(super) fn changed_meanwhile() -> ComputeError {
-    ComputeError::inconsistent("statistics", "executors did not find the fields of the version")
+    ComputeError::inconsistent(
+        "statistics",
+        "executors did not find the fields of the version",
+    )
 }
 
 async fn in_process(
@@ -103,7 +106,9 @@ fn only_part(batches: &[RecordBatch]) -> Result<Option<Accumulated>, ComputeErro
     match (rows.next(), rows.next()) {
         (Some(batch), None) if batch.num_rows() == 1 => {
             let part = batch.column(0).as_binary::<i32>();
-            let part = part.is_valid(0).then(|| Accumulated::of_bytes(part.value(0)));
+            let part = part
+                .is_valid(0)
+                .then(|| Accumulated::of_bytes(part.value(0)));
             part.transpose()
         }
         _ => Err(ComputeError::inconsistent(

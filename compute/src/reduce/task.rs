@@ -1,7 +1,7 @@
 //! A piece of a question: some blocks of a run of steps, or chunks of a field, read, reduced and forgotten.
 
 use std::cmp::Reverse;
-use std::collections::{BinaryHeap, BTreeSet};
+use std::collections::{BTreeSet, BinaryHeap};
 use std::sync::Arc;
 
 use contract::chunk::Window;
@@ -80,7 +80,8 @@ impl Task {
             (Layout::Blocks, Some(values)) => {
                 let steps = piece.of_version();
                 let runs = values.time_major();
-                runs.iter().any(|run| run.start <= steps.start && steps.end <= run.end)
+                runs.iter()
+                    .any(|run| run.start <= steps.start && steps.end <= run.end)
             }
             (Layout::Sums, Some(values)) => {
                 let basis = values.summed_as(&piece.of_version());

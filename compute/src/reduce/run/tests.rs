@@ -112,7 +112,7 @@ fn tasks_have_about_as_much_to_read_whatever_the_order_of_pieces() {
         let cost = |task: &Task| task.pieces.iter().map(Piece::cost_bytes).sum::<u64>();
         tasks.iter().map(cost).collect::<Vec<u64>>()
     };
-    let whole: u64 = costs(&[all.clone()])[0];
+    let whole: u64 = costs(std::slice::from_ref(&all))[0];
     for count in [2, 8, 16] {
         let costs = costs(&all.clone().dealt(count));
         assert_eq!(costs.iter().sum::<u64>(), whole);
