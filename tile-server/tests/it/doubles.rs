@@ -226,6 +226,8 @@ pub(crate) struct Analyst {
     pub(crate) made: Mutex<Vec<SeriesQuestion>>,
     pub(crate) check: Mutex<Option<Check>>,
     pub(crate) mood: Mutex<Mood>,
+    /// Series of places wait for one of these each, if there are any.
+    pub(crate) turns: Option<Arc<Semaphore>>,
 }
 
 impl Analyst {
@@ -247,6 +249,9 @@ impl Analyse for Analyst {
         place: LonLatDeg,
     ) -> Result<PointSeries, BackendError> {
         self.points.lock().unwrap().push(place);
+        if let Some(turns) = &self.turns {
+            turns.acquire().await.unwrap().forget();
+        }
         self.mood().apply()?;
         let (row, col) = manifest.cell_inside(place).unwrap();
         let is_sum = manifest.quantity == Quantity::AccumulatedCarbon;
