@@ -133,7 +133,8 @@ impl Engine {
         })
     }
 
-    /// The same engine, its queries in this process taking no more memory than this for what they must hold.
+    /// The same engine, its work in this process taking no more memory than this for what it must hold: values in flight, cells over all
+    /// time, sorted rows.
     #[must_use]
     pub fn with_memory_bytes(self, memory_bytes: usize) -> Self {
         let inner = &self.inner;
@@ -229,6 +230,11 @@ impl Engine {
     /// Where its queries read objects.
     pub(crate) fn objects(&self) -> &Objects {
         &self.inner.objects
+    }
+
+    /// Memory that its work in this process may take, bytes.
+    pub(crate) fn memory_bytes(&self) -> usize {
+        self.inner.memory_bytes
     }
 
     /// Parts that a question is cut into.

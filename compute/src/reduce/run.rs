@@ -13,6 +13,7 @@ use futures::{StreamExt as _, TryStreamExt as _, stream};
 use super::accumulator::Accumulated;
 use super::question::{Piece, Question};
 use super::task::{Task, Worker};
+use super::tasks::PIECE_BYTES;
 use crate::scan;
 use crate::session::QueryContext;
 use crate::{ComputeError, Engine};
@@ -47,8 +48,9 @@ async fn in_process(
     pieces: Vec<Piece>,
 ) -> Result<Accumulated, ComputeError> {
     let worker = Worker::new(engine.objects(), question, values).await?;
-    // One is read while the others are reduced.
-    let at_once = engine.partitions().get() + 1;
+    // One is read while the others are reduced; each is held as it was stored, and as it is reduced.
+    let held = engine.memory_bytes() / (4 * PIECE_BYTES as usize);
+    let at_once = (engine.partitions().get() + 1).min(held.max(1));
     let mut reduced = stream::iter(pieces)
         .map(|piece| worker.reduce(piece))
         .buffer_unordered(at_once);

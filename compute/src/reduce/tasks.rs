@@ -15,7 +15,7 @@ use super::inside::{Inside, InsideRun};
 use super::question::{CHUNK_BYTES, Layout, OPEN_BYTES, Piece, RECORD_BYTES, block_bytes};
 
 /// Values that a piece holds at once, bytes before compression.
-const PIECE_BYTES: u64 = 8 << 20;
+pub(super) const PIECE_BYTES: u64 = 8 << 20;
 /// Runs of blocks whose sums a piece holds at once: some of each piece of the region.
 const SUMS_AT_ONCE: usize = 512;
 
