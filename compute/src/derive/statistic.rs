@@ -42,7 +42,7 @@ pub fn derive_statistic<'a>(
 
 /// Derives statistics of each cell of the newest version of a product, or of those in one region, in their order.
 ///
-/// Cells are read once for all of them, in blocks over all time, as many at once as fit 128 MiB, and computed on all processors:
+/// Cells are read once for all of them, in blocks over all time, as many at once as fit an eighth of the engine's memory, and computed on all processors:
 /// the same bits whatever their number. Where the newest version of a statistic was derived from the same steps in the same way, it
 /// is returned as it is. [`super::derived`] is the event to tell of each, after its manifest.
 ///

@@ -9,8 +9,9 @@ use cube::{BLOCK_CELLS, Values};
 use super::wanted::Wanted;
 use crate::ComputeError;
 
-/// Values that are held at once: 128 MiB of f32.
-const HELD_VALUES: usize = 32 << 20;
+/// Share of the memory for work that the values of some blocks take.
+const HELD_SHARE: usize = 8;
+
 /// Cells over all steps.
 pub(super) struct Cells {
     /// Place of each in the grid, row-major.
@@ -27,15 +28,15 @@ pub(super) struct Blocks {
 }
 
 impl Blocks {
-    /// Those in which some cell is wanted.
-    pub(super) fn of(manifest: &Manifest, wanted: &Wanted) -> Self {
+    /// Those in which some cell is wanted; work may take so much memory.
+    pub(super) fn of(manifest: &Manifest, wanted: &Wanted, memory_bytes: usize) -> Self {
         let a_block = (BLOCK_CELLS * BLOCK_CELLS) as usize * manifest.steps.len().max(1);
         Self {
             windows: (0..)
                 .zip(windows(&manifest.grid, BLOCK_CELLS, BLOCK_CELLS))
                 .filter(|(_, window)| wanted.is_any_of(&manifest.grid, *window))
                 .collect(),
-            at_once: (HELD_VALUES / a_block).max(1),
+            at_once: (memory_bytes / HELD_SHARE / (a_block * size_of::<f32>())).max(1),
         }
     }
 

@@ -17,8 +17,8 @@ use super::plan::{Output, Plan};
 use super::wanted::Wanted;
 use crate::{ComputeError, Engine};
 
-/// Values of all steps that are computed together: 512 MiB of f64.
-const MOST_VALUES: usize = 64 << 20;
+/// Share of the memory for work that the values of all outputs take.
+const COMPUTED_SHARE: usize = 2;
 
 /// A statistic that was computed, to be stored.
 pub(super) struct Landing<'a> {
@@ -45,15 +45,16 @@ pub(super) async fn computed(
     let counts = of_cells.output_counts();
     let outputs: usize = counts.iter().sum();
     let cell_count = source.grid.cell_count();
-    if outputs.saturating_mul(cell_count) > MOST_VALUES {
+    let most = engine.memory_bytes() / COMPUTED_SHARE / size_of::<f64>();
+    if outputs.saturating_mul(cell_count) > most {
         let reason = format!(
-            "{outputs} steps of {cell_count} cells are more than the {MOST_VALUES} values that are held at once: ask for fewer at a time"
+            "{outputs} steps of {cell_count} cells are more than the {most} values that are held at once: ask for fewer at a time, or give it more memory (--memory-mib)"
         );
         let name = plans[0].statistic.to_string();
         return Err(ContractError::invalid("statistic", &name, reason).into());
     }
     let mut all = vec![vec![f64::NAN; cell_count]; outputs];
-    let blocks = Blocks::of(source, wanted);
+    let blocks = Blocks::of(source, wanted, engine.memory_bytes());
     let values = engine.values(source, &source.id()).await?;
     let step_count = source.steps.len();
     let all_cells = wanted.count(0..cell_count);
