@@ -117,8 +117,8 @@ async fn a_climatology_is_a_product_of_twelve_months() {
         }
         assert_eq!(derived(&engine, &options).await.unwrap(), made);
     }
-    // Nor does memory change a bit: blocks are read one by one.
-    let small = engine.clone().with_memory_bytes(64 << 10);
+    // Nor does memory change a bit: blocks are read two by two.
+    let small = engine.clone().with_memory_bytes(160 << 10);
     let name = Some(product("small"));
     let of_small = MapOptions {
         name,
@@ -127,7 +127,7 @@ async fn a_climatology_is_a_product_of_twelve_months() {
     let of_small = derived(&small, &of_small).await.unwrap();
     let (a, b) = (read(&store, &made, 6).await, read(&store, &of_small, 6).await);
     assert!(a.iter().zip(&b).all(|(a, b)| a.to_bits() == b.to_bits()));
-    let tiny = engine.clone().with_memory_bytes(32 << 10);
+    let tiny = engine.clone().with_memory_bytes(64 << 10);
     let name = Some(product("tiny"));
     let refused = MapOptions {
         name,
