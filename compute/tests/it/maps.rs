@@ -392,7 +392,7 @@ async fn extremes_percentiles_and_counts_of_cells_are_those_of_places() {
     let mut options: Vec<MapOptions> = names
         .iter()
         .map(|name| MapOptions {
-            least_percent: 3,
+            least_percent: 2,
             ..MapOptions::new(name.parse().unwrap())
         })
         .collect();
