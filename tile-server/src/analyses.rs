@@ -147,7 +147,7 @@ impl<T: Send + Sync + 'static> Answers<T> {
 
 impl Analyses {
     /// Nothing computed yet.
-    pub fn new(analyst: Arc<dyn Analyse>, gate: FairGate, metrics: Metrics) -> Self {
+    pub(crate) fn new(analyst: Arc<dyn Analyse>, gate: FairGate, metrics: Metrics) -> Self {
         Self {
             analyst,
             gate,

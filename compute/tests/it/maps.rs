@@ -125,7 +125,10 @@ async fn a_climatology_is_a_product_of_twelve_months() {
         ..options.clone()
     };
     let of_small = derived(&small, &of_small).await.unwrap();
-    let (a, b) = (read(&store, &made, 6).await, read(&store, &of_small, 6).await);
+    let (a, b) = (
+        read(&store, &made, 6).await,
+        read(&store, &of_small, 6).await,
+    );
     assert!(a.iter().zip(&b).all(|(a, b)| a.to_bits() == b.to_bits()));
     let tiny = engine.clone().with_memory_bytes(64 << 10);
     let name = Some(product("tiny"));

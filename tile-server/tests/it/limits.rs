@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use axum::body::Body;
 use axum::http::{HeaderName, Request, StatusCode};
-use futures::FutureExt as _;
+use futures::FutureExt;
 use tile_server::backend::{BackendError, Class};
 use tokio::sync::Semaphore;
 
