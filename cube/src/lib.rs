@@ -32,6 +32,7 @@ pub mod scale;
 mod series;
 mod staged;
 mod state;
+mod stored_chunks;
 mod summing;
 mod sums;
 mod unreadable;

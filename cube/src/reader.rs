@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use bytes::Bytes;
 use contract::chunk::Window;
 use futures::future::BoxFuture;
 use futures::stream::{self, StreamExt as _, TryStreamExt as _};
@@ -19,6 +18,7 @@ use crate::field::Decoder;
 use crate::layout::RUN_STEPS;
 use crate::object_storage::ObjectStorage;
 use crate::series::Runs;
+use crate::stored_chunks::StoredChunks;
 use crate::sums::Sums;
 use crate::unreadable::Object;
 use crate::{CubeError, Description, Layout, Step, arrays, axis};
@@ -203,13 +203,13 @@ impl Cube {
     }
 
     /// Blocks of a run that [`Self::run_of`] gave, as they are stored.
-    pub(crate) async fn encoded(
+    pub(crate) async fn stored_blocks(
         &self,
         run: usize,
         blocks: &[[u32; 2]],
-    ) -> Result<Vec<Option<Bytes>>, CubeError> {
+    ) -> Result<StoredChunks, CubeError> {
         match &self.0.blocks {
-            Some(own) => own.encoded(run, blocks).await,
+            Some(own) => own.stored(run, blocks).await,
             None => Err(self.no_run(run)),
         }
     }
@@ -249,9 +249,9 @@ impl Cube {
         &self,
         run: usize,
         blocks: &[[u32; 2]],
-    ) -> Result<Vec<Option<Bytes>>, CubeError> {
+    ) -> Result<StoredChunks, CubeError> {
         match &self.0.records {
-            Some(own) => own.encoded(run, blocks).await,
+            Some(own) => own.stored(run, blocks).await,
             None => Err(self.no_run(run)),
         }
     }

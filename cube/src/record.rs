@@ -66,11 +66,11 @@ impl Record {
         put(16, &|step, place| self.squares[step].to_le_bytes()[place]);
     }
 
-    /// Reads one of [`RECORD_BYTES`] bytes.
+    /// Reads one of [`RECORD_BYTES`] bytes; squares stay what they are unless they are wanted.
     ///
     /// # Errors
     /// It begins as no record does.
-    pub(crate) fn read(&mut self, bytes: &[u8]) -> Result<(), String> {
+    pub(crate) fn read(&mut self, bytes: &[u8], with_squares: bool) -> Result<(), String> {
         self.is_summed = match bytes.first() {
             Some(0) => true,
             Some(&UNSUMMED) => false,
@@ -97,7 +97,8 @@ impl Record {
         for (own, weight) in self.weights.iter_mut().zip(word(8)) {
             *own = weight.cast_signed();
         }
-        for sums in [&mut self.sums, &mut self.squares] {
+        let squares = with_squares.then_some(&mut self.squares);
+        for sums in [Some(&mut self.sums), squares].into_iter().flatten() {
             let (low, high) = (word(8), word(8));
             for (own, (low, high)) in sums.iter_mut().zip(low.into_iter().zip(high)) {
                 *own = i128::from(high.cast_signed()) << 64 | i128::from(low);
@@ -129,10 +130,14 @@ mod tests {
             own.is_summed = is_summed;
             own.write(&mut bytes);
             let mut back = Record::default();
-            back.read(&bytes).unwrap();
+            back.read(&bytes, true).unwrap();
             assert_eq!(back, own);
+            let mut without = Record::default();
+            without.read(&bytes, false).unwrap();
+            assert_eq!((&without.sums, &without.valid), (&own.sums, &own.valid));
+            assert_eq!(without.squares, Record::default().squares);
         }
         bytes[0] = 2;
-        assert!(Record::default().read(&bytes).is_err());
+        assert!(Record::default().read(&bytes, true).is_err());
     }
 }
