@@ -80,15 +80,11 @@ impl Record {
                 ));
             }
         };
-        let mut planes = bytes[HEADER_BYTES..].chunks_exact(RUN_STEPS);
+        let mut rest = &bytes[HEADER_BYTES..];
         let mut word = |count: usize| {
-            let mut words = [0u64; RUN_STEPS];
-            for (place, plane) in planes.by_ref().take(count).enumerate() {
-                for (word, byte) in words.iter_mut().zip(plane) {
-                    *word |= u64::from(*byte) << (8 * place);
-                }
-            }
-            words
+            let (planes, others) = rest.split_at(count * RUN_STEPS);
+            rest = others;
+            words(planes)
         };
         self.valid.copy_from_slice(&word(8));
         for (own, count) in self.counts.iter_mut().zip(word(4)) {
@@ -108,9 +104,56 @@ impl Record {
     }
 }
 
+/// Side of the squares of bytes that are turned at a time.
+const SIDE: usize = size_of::<u64>();
+
+/// Words of up to eight bytes, from planes of the lowest byte of all steps, the next one of all, and so on.
+fn words(planes: &[u8]) -> [u64; RUN_STEPS] {
+    let mut words = [0; RUN_STEPS];
+    for (at, words) in words.as_chunks_mut::<SIDE>().0.iter_mut().enumerate() {
+        let mut square = [0; SIDE];
+        for (row, plane) in square.iter_mut().zip(planes.as_chunks::<RUN_STEPS>().0) {
+            *row = u64::from_le_bytes(plane.as_chunks().0[at]);
+        }
+        *words = turned(square);
+    }
+    words
+}
+
+/// A square of bytes with its rows as columns: halves are exchanged, then quarters, then single bytes.
+fn turned(mut rows: [u64; SIDE]) -> [u64; SIDE] {
+    for (distance, mask) in [
+        (4, 0x0000_0000_FFFF_FFFF),
+        (2, 0x0000_FFFF_0000_FFFF),
+        (1, 0x00FF_00FF_00FF_00FF),
+    ] {
+        for row in (0..SIDE).filter(|row| row & distance == 0) {
+            let other = row + distance;
+            let exchanged = ((rows[row] >> (8 * distance)) ^ rows[other]) & mask;
+            rows[other] ^= exchanged;
+            rows[row] ^= exchanged << (8 * distance);
+        }
+    }
+    rows
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn words_are_made_of_the_bytes_of_their_planes() {
+        for count in [1, 4, 8] {
+            let planes: Vec<u8> = (0..count * RUN_STEPS)
+                .map(|at| (at * 7919 % 251) as u8)
+                .collect();
+            for (step, word) in words(&planes).into_iter().enumerate() {
+                let byte =
+                    |place: usize| u64::from(planes[place * RUN_STEPS + step]) << (8 * place);
+                assert_eq!(word, (0..count).map(byte).sum::<u64>(), "{count} {step}");
+            }
+        }
+    }
 
     #[test]
     fn bytes_lead_back_and_nothing_is_all_zeros() {

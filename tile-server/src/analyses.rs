@@ -39,6 +39,10 @@ const TEXT_BYTES: u64 = 128 << 20;
 /// What is made of series and remembered; a Hovmöller diagram takes 8 MiB at most.
 const MADE_OF_SERIES: usize = 40;
 
+fn text_bytes(text: &Bytes) -> u64 {
+    text.len() as u64 + 1
+}
+
 /// Rows of an answer, those of its regions too.
 fn budget_rows(answer: &BudgetAnswer) -> u64 {
     let of_regions = answer
@@ -138,7 +142,7 @@ impl Analyses {
             metrics,
             budgets: Answers::new(BUDGETS, BUDGET_ROWS, budget_rows),
             histories: Answers::new(HISTORIES, HISTORIES as u64, |_one| 1),
-            texts: Answers::new(TEXTS, TEXT_BYTES, |text| text.len() as u64),
+            texts: Answers::new(TEXTS, TEXT_BYTES, text_bytes),
             made_of_series: Answers::new(MADE_OF_SERIES, MADE_OF_SERIES as u64, |_one| 1),
         }
     }
@@ -268,4 +272,29 @@ fn written(
         RowsForm::Csv | RowsForm::Arrow => analyst.encoded(&answer.columns(), form)?,
     };
     Ok(Bytes::from(content))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[tokio::test]
+    async fn what_is_remembered_is_bounded_by_its_bytes() {
+        let registry = crate::metrics::Registry::new();
+        let metrics = Metrics::register(&registry).unwrap();
+        let gate = Gate::new(1, 1);
+        let answers: Answers<Bytes> = Answers::new(4, 1000, text_bytes);
+        for number in 0..50_u8 {
+            let computed = async move { Ok::<_, ServerError>(Bytes::from(vec![number; 300])) };
+            let key = Digest::of(&[number]);
+            let text = answers
+                .answer(key, &gate, &metrics, computed)
+                .await
+                .unwrap();
+            assert_eq!(text[0], number);
+            let held = answers.remembered.weight();
+            assert!(held <= 1000, "{held}");
+        }
+        assert!(answers.remembered.weight() >= 301, "nothing is remembered");
+    }
 }

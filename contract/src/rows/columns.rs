@@ -121,7 +121,6 @@ impl Tabular for PointSeries {
         let mut columns = vec![
             instants("start", series, |row: &PointValue| row.start),
             instants("end", series, |row| row.end),
-            instants("mid", series, |row| row.mid),
             numbers("value", unit, series, |row| row.value),
         ];
         if series.iter().any(|row| row.contributed.is_some()) {
@@ -159,7 +158,6 @@ impl Tabular for RegionSeries {
         let columns = vec![
             instants("start", series, |row: &RegionValue| row.start),
             instants("end", series, |row| row.end),
-            instants("mid", series, |row| row.mid),
             numbers("mean", &self.cited.unit, series, |row| row.mean),
             numbers("area_m2", "m2", series, |row| Some(row.area_m2)),
             numbers("coverage_percent", "%", series, |row| {
@@ -191,19 +189,15 @@ impl Tabular for StatisticsAnswer {
         let mut columns = vec![
             instants("start", rows, |row: &StatisticsRow| row.start),
             instants("end", rows, |row| row.end),
-            instants("mid", rows, |row| row.mid),
         ];
         for note in &self.statistics {
             let value = |row: &StatisticsRow| row.values.get(&note.name).copied().flatten();
             columns.push(numbers(&note.name, &note.unit, rows, value));
-        }
-        // Extremes say when they were found.
-        for note in &self.statistics {
-            let found = |row: &StatisticsRow| row.found_at.get(&note.name).copied();
-            if rows.iter().any(|row| found(row).is_some()) {
-                let values = rows.iter().map(found).collect();
-                let name = format!("{}_found_at", note.name);
-                columns.push(column(&name, None, ColumnValues::SomeInstants(values)));
+            // Extremes say when they were found.
+            if ["min", "max"].contains(&note.name.as_str()) {
+                let found = rows.iter().map(|row| row.found_at.get(&note.name).copied());
+                let values = ColumnValues::SomeInstants(found.collect());
+                columns.push(column(&format!("{}_found_at", note.name), None, values));
             }
         }
         columns.extend([
@@ -297,8 +291,8 @@ mod tests {
             series: (0..3).map(row).collect(),
         };
         let columns = own.columns();
-        assert_eq!(names(&columns), ["start", "end", "mid", "value"]);
-        let value = &columns.columns[3];
+        assert_eq!(names(&columns), ["start", "end", "value"]);
+        let value = &columns.columns[2];
         assert_eq!(
             value.values,
             ColumnValues::Numbers(vec![Some(0.0), None, Some(2.0)])
@@ -321,7 +315,7 @@ mod tests {
         });
         let columns = own.columns();
         assert_eq!(
-            names(&columns)[4..],
+            names(&columns)[3..],
             [
                 "contributed_steps",
                 "contributed_of_steps",
@@ -329,7 +323,7 @@ mod tests {
             ]
         );
         assert_eq!(
-            columns.columns[5].values,
+            columns.columns[4].values,
             ColumnValues::Counts(vec![None, Some(2), None])
         );
         assert!(
@@ -380,7 +374,6 @@ mod tests {
         let expected = [
             "start",
             "end",
-            "mid",
             "mean",
             "max",
             "max_found_at",
@@ -390,12 +383,12 @@ mod tests {
         ];
         assert_eq!(names(&columns), expected);
         let values = |at: usize| columns.columns[at].values.clone();
-        assert_eq!(values(4), ColumnValues::Numbers(vec![Some(4.0), None]));
+        assert_eq!(values(3), ColumnValues::Numbers(vec![Some(4.0), None]));
         assert_eq!(
-            values(5),
+            values(4),
             ColumnValues::SomeInstants(vec![Some(day(9)), None])
         );
-        assert_eq!(values(8), ColumnValues::Flags(vec![false, true]));
+        assert_eq!(values(7), ColumnValues::Flags(vec![false, true]));
         let about: serde_json::Value = serde_json::from_str(&columns.about).unwrap();
         assert_eq!((&about["kind"], about.get("rows")), (&"area".into(), None));
     }

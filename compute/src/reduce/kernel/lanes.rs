@@ -1,5 +1,5 @@
-//! Loops over the steps of one cell: values in, whole numbers added to sums out. They are compiled twice, for any processor and for those
-//! that take four numbers at a time (AVX2); both add the same integers.
+//! Loops over the steps of one cell: values in, whole numbers added to sums out. They are compiled for any processor and for those
+//! that take four numbers at a time (AVX2) or eight (AVX-512); all add the same integers.
 
 use cube::scale::{Scale, nearest};
 
@@ -25,7 +25,7 @@ impl Steps {
 
     #[expect(
         clippy::inline_always,
-        reason = "a part of loops that are compiled twice"
+        reason = "a part of loops that are compiled several times"
     )]
     #[inline(always)]
     fn distance(self, value: f32) -> f64 {
@@ -46,11 +46,46 @@ pub(super) struct ByStep<'a> {
 /// Adds the values of a cell; is one among them that cannot be summed? Then the sums say nothing.
 pub(super) fn add(values: &[f32], steps: Steps, to: &mut ByStep<'_>) -> bool {
     #[cfg(target_arch = "x86_64")]
-    if is_x86_feature_detected!("avx2") {
-        #[expect(unsafe_code, reason = "the processor has what it is compiled for")]
-        // SAFETY: AVX2 was found the line before.
-        return unsafe { add_avx2(values, steps, to) };
+    #[expect(unsafe_code, reason = "the processor has what it is compiled for")]
+    match Lanes::of_this_processor() {
+        // SAFETY: the processor was asked.
+        Lanes::Eight => return unsafe { add_avx512(values, steps, to) },
+        // SAFETY: as above.
+        Lanes::Four => return unsafe { add_avx2(values, steps, to) },
+        Lanes::Any => {}
     }
+    add_any(values, steps, to)
+}
+
+/// How many numbers a processor takes at a time.
+#[cfg(target_arch = "x86_64")]
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Lanes {
+    Any,
+    /// AVX2.
+    Four,
+    /// AVX-512 with products of 64 bits.
+    Eight,
+}
+
+#[cfg(target_arch = "x86_64")]
+impl Lanes {
+    /// The library asks the processor once.
+    fn of_this_processor() -> Self {
+        let is_eight = is_x86_feature_detected!("avx512f")
+            && is_x86_feature_detected!("avx512dq")
+            && is_x86_feature_detected!("avx512vl");
+        match (is_eight, is_x86_feature_detected!("avx2")) {
+            (true, _) => Self::Eight,
+            (false, true) => Self::Four,
+            (false, false) => Self::Any,
+        }
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f,avx512dq,avx512vl")]
+fn add_avx512(values: &[f32], steps: Steps, to: &mut ByStep<'_>) -> bool {
     add_any(values, steps, to)
 }
 
@@ -60,7 +95,7 @@ fn add_avx2(values: &[f32], steps: Steps, to: &mut ByStep<'_>) -> bool {
     add_any(values, steps, to)
 }
 
-#[expect(clippy::inline_always, reason = "it is compiled twice")]
+#[expect(clippy::inline_always, reason = "it is compiled several times")]
 #[inline(always)]
 fn add_any(values: &[f32], steps: Steps, to: &mut ByStep<'_>) -> bool {
     let mut beyond = 0;
@@ -90,12 +125,21 @@ pub(super) struct Weighed<'a> {
 /// Adds how many values there are times what each of them weighs, and what coverage counts of it.
 pub(super) fn add_counts(counts: &[i64], [weight, covered]: [i64; 2], to: &mut Weighed<'_>) {
     #[cfg(target_arch = "x86_64")]
-    if is_x86_feature_detected!("avx2") {
-        #[expect(unsafe_code, reason = "the processor has what it is compiled for")]
-        // SAFETY: AVX2 was found the line before.
-        return unsafe { add_counts_avx2(counts, [weight, covered], to) };
+    #[expect(unsafe_code, reason = "the processor has what it is compiled for")]
+    match Lanes::of_this_processor() {
+        // SAFETY: the processor was asked.
+        Lanes::Eight => return unsafe { add_counts_avx512(counts, [weight, covered], to) },
+        // SAFETY: as above.
+        Lanes::Four => return unsafe { add_counts_avx2(counts, [weight, covered], to) },
+        Lanes::Any => {}
     }
     add_counts_any(counts, [weight, covered], to);
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f,avx512dq,avx512vl")]
+fn add_counts_avx512(counts: &[i64], weights: [i64; 2], to: &mut Weighed<'_>) {
+    add_counts_any(counts, weights, to);
 }
 
 #[cfg(target_arch = "x86_64")]
@@ -104,7 +148,7 @@ fn add_counts_avx2(counts: &[i64], weights: [i64; 2], to: &mut Weighed<'_>) {
     add_counts_any(counts, weights, to);
 }
 
-#[expect(clippy::inline_always, reason = "it is compiled twice")]
+#[expect(clippy::inline_always, reason = "it is compiled several times")]
 #[inline(always)]
 fn add_counts_any(counts: &[i64], [weight, covered]: [i64; 2], to: &mut Weighed<'_>) {
     for (own, count) in to.counts.iter_mut().zip(counts) {
@@ -124,8 +168,22 @@ mod tests {
 
     use super::*;
 
+    type Add = dyn Fn(&[f32], Steps, &mut ByStep<'_>) -> bool;
+
+    /// Those that this processor can run.
+    fn compilations() -> Vec<&'static Add> {
+        let mut all: Vec<&Add> = vec![&add, &add_any];
+        #[cfg(target_arch = "x86_64")]
+        if is_x86_feature_detected!("avx2") {
+            #[expect(unsafe_code, reason = "the processor was asked")]
+            // SAFETY: the line before.
+            all.push(&|values, steps, to| unsafe { add_avx2(values, steps, to) });
+        }
+        all
+    }
+
     #[test]
-    fn both_compilations_add_the_same_integers() {
+    fn all_compilations_add_the_same_integers() {
         for quantity in [Quantity::CarbonFlux, Quantity::SeaSurfaceTemperature] {
             let scale = Scale::of(quantity).unwrap();
             let (low, high) = quantity.plausible().into_inner();
@@ -135,7 +193,7 @@ mod tests {
                     part => (low + (high - low) * part as f64 / 11.0) as f32,
                 };
                 let mut values: Vec<f32> = (0..count).map(value).collect();
-                let of = |add: &dyn Fn(&[f32], Steps, &mut ByStep<'_>) -> bool, values: &[f32]| {
+                let of = |add: &Add, values: &[f32]| {
                     let mut all = [vec![3; count], vec![-5; count], vec![9; count]];
                     let [counts, steps, squares] = &mut all;
                     let mut to = ByStep {
@@ -146,8 +204,10 @@ mod tests {
                     let is_beyond = add(values, Steps::of(scale), &mut to);
                     (is_beyond, all)
                 };
-                let found = of(&add, &values);
-                assert_eq!(found, of(&add_any, &values));
+                let found = of(&add_any, &values);
+                for compiled in compilations() {
+                    assert_eq!(found, of(compiled, &values));
+                }
                 assert!(!found.0);
                 for (at, value) in values.iter().enumerate() {
                     let is_there = !value.is_nan();
@@ -167,7 +227,9 @@ mod tests {
                 ] {
                     if let Some(last) = values.last_mut() {
                         *last = bad;
-                        assert!(of(&add, &values).0 && of(&add_any, &values).0, "{bad}");
+                        for compiled in compilations() {
+                            assert!(of(compiled, &values).0, "{bad}");
+                        }
                     }
                 }
             }
