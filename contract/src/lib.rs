@@ -41,6 +41,7 @@ pub mod picture;
 pub mod product;
 pub mod quantity;
 pub mod region;
+pub mod rows;
 pub mod series;
 mod sky;
 pub mod statistics;

@@ -31,6 +31,9 @@ pub(crate) const DIGEST_CHUNK: u64 = 256;
 pub(crate) const DIGEST_BYTES: u64 = 32;
 /// What compresses values; higher levels cost several times as long for a few percent.
 const ZSTD_LEVEL: i32 = 3;
+/// The same of blocks along time and of sums of them: below 0 no numbers are coded bit by bit, and to decode a block takes a third
+/// of the time, for a tenth more bytes (docs/decisions/035-quick-statistics.md).
+const QUICK_ZSTD_LEVEL: i32 = -1;
 
 /// An array without a store: what it is like.
 pub(crate) type Definition = Array<()>;
@@ -40,6 +43,7 @@ struct Shape {
     name: String,
     cells: Vec<u64>,
     chunk: Vec<u64>,
+    zstd_level: i32,
     dimensions: &'static [&'static str],
 }
 
@@ -50,6 +54,7 @@ pub(crate) fn values(description: &Description, steps: u64) -> Result<Definition
         name: cf::variable(description.quantity),
         cells: vec![steps, grid.rows.into(), grid.cols.into()],
         chunk: vec![1, layout.object[0].into(), layout.object[1].into()],
+        zstd_level: ZSTD_LEVEL,
         dimensions: &["time", "lat", "lon"],
     };
     let inner = layout
@@ -75,6 +80,7 @@ pub(crate) fn series(description: &Description, runs: usize) -> Result<Definitio
         name: format!("{SERIES}/{}", cf::variable(description.quantity)),
         cells: vec![grid.rows.into(), grid.cols.into(), runs as u64 * run],
         chunk: vec![rows.into(), cols.into(), run],
+        zstd_level: QUICK_ZSTD_LEVEL,
         dimensions: &["lat", "lon", "series_time"],
     };
     let block = u64::from(BLOCK_CELLS);
@@ -99,6 +105,7 @@ pub(crate) fn sums(description: &Description, runs: usize) -> Result<Definition,
         name: format!("{SUMS}/blocks"),
         cells: vec![blocks(grid.rows), blocks(grid.cols), runs as u64 * record],
         chunk: vec![blocks(shard[0]), blocks(shard[1]), record],
+        zstd_level: QUICK_ZSTD_LEVEL,
         dimensions: &["block_row", "block_col", "byte"],
     };
     let inner = Some(vec![1, 1, record]);
@@ -172,6 +179,7 @@ pub(crate) fn row_weights(grid: &Grid) -> Result<Definition, CubeError> {
         name: format!("{SUMS}/row_weights"),
         cells: vec![grid.rows.into()],
         chunk: vec![grid.rows.into()],
+        zstd_level: ZSTD_LEVEL,
         dimensions: &["row"],
     };
     define(&shape, int64(), 0i64.into(), Map::new(), None)
@@ -183,6 +191,7 @@ pub(crate) fn runs(group: &str, runs: usize) -> Result<Definition, CubeError> {
         name: format!("{group}/steps_sha256"),
         cells: vec![runs as u64, DIGEST_BYTES],
         chunk: vec![DIGEST_CHUNK, DIGEST_BYTES],
+        zstd_level: ZSTD_LEVEL,
         dimensions: &["run", "sha256_byte"],
     };
     define(&shape, uint8(), 0u8.into(), cf::of_runs(), None)
@@ -190,13 +199,13 @@ pub(crate) fn runs(group: &str, runs: usize) -> Result<Definition, CubeError> {
 
 /// Codecs of one chunk of values, which in a shard is a part of an object.
 pub(crate) fn chunk_codecs() -> CodecChain {
-    CodecChain::new(vec![], Arc::new(BytesCodec::little()), checked())
+    CodecChain::new(vec![], Arc::new(BytesCodec::little()), checked(ZSTD_LEVEL))
 }
 
 /// Compressed, and with a checksum of what is stored.
-fn checked() -> Vec<Arc<dyn BytesToBytesCodecTraits>> {
+fn checked(zstd_level: i32) -> Vec<Arc<dyn BytesToBytesCodecTraits>> {
     vec![
-        Arc::new(ZstdCodec::new(ZSTD_LEVEL, false)),
+        Arc::new(ZstdCodec::new(zstd_level, false)),
         Arc::new(Crc32cCodec::new()),
     ]
 }
@@ -244,6 +253,7 @@ fn axis_in(folder: &str, quantity: Quantity, steps: u64) -> Result<Axis, CubeErr
             name: format!("{folder}{name}"),
             cells: vec![steps],
             chunk: vec![TIME_CHUNK],
+            zstd_level: ZSTD_LEVEL,
             dimensions: &["time"],
         };
         define(&shape, int64(), 0i64.into(), attributes, None)
@@ -252,12 +262,14 @@ fn axis_in(folder: &str, quantity: Quantity, steps: u64) -> Result<Axis, CubeErr
         name: format!("{folder}time_bnds"),
         cells: vec![steps, 2],
         chunk: vec![TIME_CHUNK, 2],
+        zstd_level: ZSTD_LEVEL,
         dimensions: &["time", "bnds"],
     };
     let digests = Shape {
         name: format!("{folder}values_sha256"),
         cells: vec![steps, DIGEST_BYTES],
         chunk: vec![DIGEST_CHUNK, DIGEST_BYTES],
+        zstd_level: ZSTD_LEVEL,
         dimensions: &["time", "sha256_byte"],
     };
     let is_sum = quantity == Quantity::AccumulatedCarbon;
@@ -302,6 +314,7 @@ fn fixed_in(folder: &str, (lat, lon): (Places, Places)) -> Result<Vec<Fixed>, Cu
         name: format!("{folder}crs"),
         cells: vec![],
         chunk: vec![],
+        zstd_level: ZSTD_LEVEL,
         dimensions: &[],
     };
     let named = |name: &str| format!("{folder}{name}");
@@ -357,6 +370,7 @@ fn floats(
         name,
         chunk: cells.clone(),
         cells,
+        zstd_level: ZSTD_LEVEL,
         dimensions,
     };
     let definition = define(&shape, float64(), f64::NAN.into(), attributes, None)?;
@@ -372,7 +386,7 @@ fn define(
 ) -> Result<Definition, CubeError> {
     let mut builder = ArrayBuilder::new(shape.cells.clone(), shape.chunk.clone(), data_type, fill);
     builder
-        .bytes_to_bytes_codecs(checked())
+        .bytes_to_bytes_codecs(checked(shape.zstd_level))
         .dimension_names(Some(shape.dimensions.iter().copied()))
         .attributes(attributes)
         .subchunk_shape(inner_chunk);
@@ -421,7 +435,7 @@ pub(crate) fn check<S: ?Sized>(
         [
             ("data type", written_out(json!(array.data_type))),
             ("chunks", written_out(json!(array.chunk_grid))),
-            ("codecs", written_out(json!(array.codecs))),
+            ("codecs", without_level(written_out(json!(array.codecs)))),
             ("fill value", json!(array.fill_value)),
             (
                 "names of chunks",
@@ -435,6 +449,25 @@ pub(crate) fn check<S: ?Sized>(
         }
     }
     Ok(())
+}
+
+/// Codecs as they are to who reads: any level of compression is decoded alike, and earlier programs chose another.
+fn without_level(codecs: Value) -> Value {
+    match codecs {
+        Value::Array(codecs) => codecs.into_iter().map(without_level).collect(),
+        Value::Object(mut codec) => {
+            if codec.get("name").is_some_and(|name| name == "zstd")
+                && let Some(Value::Object(own)) = codec.get_mut("configuration")
+            {
+                own.remove("level");
+            }
+            let inner = codec
+                .into_iter()
+                .map(|(name, own)| (name, without_level(own)));
+            Value::Object(inner.collect())
+        }
+        other => other,
+    }
 }
 
 /// A thing by its name and settings: the format lets one without settings be its name alone.

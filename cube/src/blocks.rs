@@ -22,6 +22,7 @@ use zarrs_icechunk::AsyncIcechunkStore;
 use crate::error::first_lines;
 use crate::layout::{BLOCK_CELLS, RUN_STEPS};
 use crate::object_storage::ObjectStorage;
+use crate::stored_chunks::{InPart, Part, Source, StoredChunks, TOO_SHORT};
 use crate::unreadable::Object;
 use crate::{CubeError, Description, Layout, arrays};
 
@@ -115,36 +116,35 @@ impl Blocks {
         }
     }
 
-    /// Blocks of a run as they are stored, in the order asked for; none where no cell has data. Those that lie near one another
-    /// in a shard are read together.
-    pub(crate) async fn encoded(
+    /// Blocks of a run as they are stored. Those that lie near one another in a shard are read together.
+    pub(crate) async fn stored(
         &self,
         run: usize,
         blocks: &[[u32; 2]],
-    ) -> Result<Vec<Option<Bytes>>, CubeError> {
+    ) -> Result<StoredChunks, CubeError> {
         let mut by_shard: BTreeMap<[u32; 2], Vec<usize>> = BTreeMap::new();
         for (number, block) in blocks.iter().enumerate() {
             let shard = [block[0] / self.shard[0], block[1] / self.shard[1]];
             by_shard.entry(shard).or_default().push(number);
         }
-        let mut found = vec![None; blocks.len()];
+        let mut found = StoredChunks::default();
         for (shard, numbers) in by_shard {
             let key = [shard[0].into(), shard[1].into(), run as u64];
-            if let Err(reason) = self.read_near(key, &numbers, blocks, &mut found).await {
-                return Err(self.object(key).unreadable(key, &reason).await);
+            match self.parts_with(key, &numbers, blocks).await {
+                Ok(parts) => found.0.extend(parts),
+                Err(reason) => return Err(self.object(key).unreadable(key, &reason).await),
             }
         }
         Ok(found)
     }
 
-    /// Reads blocks of one shard.
-    async fn read_near(
+    /// Parts of one shard with the blocks that are asked for.
+    async fn parts_with(
         &self,
         key: [u64; 3],
         numbers: &[usize],
         blocks: &[[u32; 2]],
-        found: &mut [Option<Bytes>],
-    ) -> Result<(), String> {
+    ) -> Result<Vec<Part>, String> {
         let index = self.index(key).await?;
         let place = |number: &usize| {
             let [offset, length] = self.place_in(&index, blocks[*number]);
@@ -156,22 +156,23 @@ impl Blocks {
         let is_near = |a: &Place, b: &Place| b.0 <= a.0 + a.1 + GAP_BYTES;
         let near: Vec<&[Place]> = places.chunk_by(is_near).collect();
         let ranges: Vec<Range<u64>> = near.iter().map(|near| range_of(near)).collect();
-        let contents = self.parts(key, &ranges).await?;
-        for ((near, range), content) in near.iter().zip(&ranges).zip(contents) {
-            for (offset, length, number) in *near {
+        let sources = self.sources(key, &ranges).await?;
+        let part = |((near, range), source): ((&&[Place], &Range<u64>), Source)| {
+            let chunk = |(offset, length, number): &Place| {
                 let start = (offset - range.start) as usize;
-                let own = start..start + *length as usize;
-                if own.end > content.len() {
-                    return Err("its shard is shorter than its index says".to_owned());
-                }
-                found[*number] = Some(content.slice(own));
-            }
-        }
-        Ok(())
+                let bytes = start..start + *length as usize;
+                let number = *number;
+                (bytes.end <= source.length()).then_some(InPart { number, bytes })
+            };
+            let chunks: Option<Vec<InPart>> = near.iter().map(chunk).collect();
+            let chunks = chunks.ok_or(TOO_SHORT)?;
+            Ok(Part { source, chunks })
+        };
+        near.iter().zip(&ranges).zip(sources).map(part).collect()
     }
 
-    /// Parts of a shard, in the order of their ranges. They are asked for at once where the store can: a region has many.
-    async fn parts(&self, shard: [u64; 3], ranges: &[Range<u64>]) -> Result<Vec<Bytes>, String> {
+    /// Where parts of a shard are read, in the order of their ranges. They are asked for at once where the store can: a region has many.
+    async fn sources(&self, shard: [u64; 3], ranges: &[Range<u64>]) -> Result<Vec<Source>, String> {
         let index = ChunkIndices(shard.iter().map(|at| *at as u32).collect());
         let session = self.array.storage().session();
         let payload = session.read().await.get_chunk_ref(&self.path, &index).await;
@@ -181,13 +182,19 @@ impl Blocks {
                 let at = |place: u64| chunk.offset.saturating_add(place).min(end);
                 at(range.start)..at(range.end)
             };
-            let ranges: Vec<Range<u64>> = ranges.iter().map(moved).collect();
-            return self.objects.parts(&chunk.id.to_string(), &ranges).await;
+            let ranges = ranges.iter().map(moved);
+            let name = chunk.id.to_string();
+            if let Some(file) = self.objects.file(&name) {
+                return Ok(ranges.map(|own| Source::File(file.clone(), own)).collect());
+            }
+            let ranges: Vec<Range<u64>> = ranges.collect();
+            let parts = self.objects.parts(&name, &ranges).await?;
+            return Ok(parts.into_iter().map(Source::Held).collect());
         }
         let read = |range: Range<u64>| async move {
             let range = ByteRange::FromStart(range.start, Some(range.end - range.start));
             let content = self.part(shard, range).await?.ok_or(NO_SHARD)?;
-            Ok::<_, String>(Bytes::from(content))
+            Ok::<_, String>(Source::Held(Bytes::from(content)))
         };
         let reads = stream::iter(ranges.iter().cloned()).map(read);
         reads.buffered(READS_AT_ONCE).try_collect().await
@@ -252,33 +259,26 @@ impl Blocks {
 
 /// Decodes one chunk after the other. The library's chain of codecs makes its tables anew for every one, which takes longer
 /// than to decode it.
-pub(crate) struct ChunkDecoder {
-    zstd: zstd::bulk::Decompressor<'static>,
-    bytes: Vec<u8>,
-}
+pub(crate) struct ChunkDecoder(zstd::bulk::Decompressor<'static>);
 
 impl ChunkDecoder {
-    /// Of chunks of so many bytes.
-    pub(crate) fn new(byte_count: usize) -> Result<Self, String> {
+    pub(crate) fn new() -> Result<Self, String> {
         let zstd = zstd::bulk::Decompressor::new();
-        Ok(Self {
-            zstd: zstd.map_err(|e| e.to_string())?,
-            bytes: vec![0; byte_count],
-        })
+        Ok(Self(zstd.map_err(|e| e.to_string())?))
     }
 
-    /// Bytes of a chunk, whose checksum is compared with what is stored first.
-    pub(crate) fn decode(&mut self, content: &[u8]) -> Result<&[u8], String> {
+    /// Fills `bytes` with a chunk, whose checksum is compared with what is stored first.
+    pub(crate) fn decode(&mut self, content: &[u8], bytes: &mut [u8]) -> Result<(), String> {
         let (compressed, _told) = content
             .split_last_chunk::<CRC_BYTES>()
             .filter(|(own, told)| crc32c::crc32c(own) == u32::from_le_bytes(**told))
             .ok_or("its bytes are not those of its checksum (crc32c)")?;
         // It holds as many bytes as a chunk has, or is refused.
-        let count = self.zstd.decompress_to_buffer(compressed, &mut self.bytes);
-        if count.map_err(|e| e.to_string())? != self.bytes.len() {
+        let count = self.0.decompress_to_buffer(compressed, bytes);
+        if count.map_err(|e| e.to_string())? != bytes.len() {
             return Err("it holds less than a chunk".to_owned());
         }
-        Ok(&self.bytes)
+        Ok(())
     }
 }
 
@@ -291,16 +291,19 @@ pub(crate) struct BlockDecoder {
 impl BlockDecoder {
     pub(crate) fn new() -> Result<Self, String> {
         Ok(Self {
-            chunks: ChunkDecoder::new(BLOCK_VALUES * size_of::<f32>())?,
+            chunks: ChunkDecoder::new()?,
             values: vec![f32::NAN; BLOCK_VALUES],
         })
     }
 
     /// Values of a block, `[cell, step]`.
     pub(crate) fn decode(&mut self, content: &[u8]) -> Result<&[f32], String> {
-        let (bytes, _rest) = self.chunks.decode(content)?.as_chunks();
-        for (value, bytes) in self.values.iter_mut().zip(bytes) {
-            *value = f32::from_le_bytes(*bytes);
+        let bytes = bytemuck::cast_slice_mut(&mut self.values);
+        self.chunks.decode(content, bytes)?;
+        if cfg!(target_endian = "big") {
+            for value in &mut self.values {
+                *value = f32::from_bits(u32::from_le(value.to_bits()));
+            }
         }
         Ok(&self.values)
     }
@@ -334,6 +337,31 @@ fn parse(content: &[u8], entries: usize) -> Result<Index, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_is_no_whole_block_is_refused() {
+        let stored = |values: &[f32]| {
+            let bytes: Vec<u8> = values
+                .iter()
+                .flat_map(|value| value.to_le_bytes())
+                .collect();
+            let mut content = zstd::bulk::compress(&bytes, 3).unwrap();
+            content.extend(crc32c::crc32c(&content).to_le_bytes());
+            content
+        };
+        let mut decoder = BlockDecoder::new().unwrap();
+        let values: Vec<f32> = (0..BLOCK_VALUES).map(|at| at as f32).collect();
+        assert_eq!(decoder.decode(&stored(&values)).unwrap(), values);
+        let less = decoder.decode(&stored(&values[1..])).unwrap_err();
+        assert!(less.contains("less than a chunk"), "{less}");
+        let more = [&values[..], &[1.0]].concat();
+        assert!(decoder.decode(&stored(&more)).is_err());
+        let mut damaged = stored(&values);
+        damaged[100] ^= 1;
+        let reason = decoder.decode(&damaged).unwrap_err();
+        assert!(reason.contains("checksum"), "{reason}");
+        assert!(decoder.decode(&[]).is_err());
+    }
 
     #[test]
     fn an_index_is_read_only_with_its_checksum() {

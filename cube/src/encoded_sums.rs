@@ -3,11 +3,11 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use bytes::Bytes;
 use futures::future::BoxFuture;
 
 use crate::blocks::ChunkDecoder;
 use crate::record::{RECORD_BYTES, Record};
+use crate::stored_chunks::StoredChunks;
 use crate::sums::Basis;
 use crate::values::{Piece, Undecoded, Values};
 use crate::{Cube, CubeError};
@@ -17,7 +17,7 @@ pub struct EncodedSums {
     cube: Cube,
     run: usize,
     at: Vec<[u32; 2]>,
-    content: Vec<Option<Bytes>>,
+    content: StoredChunks,
     pieces: Vec<Piece>,
 }
 
@@ -29,27 +29,29 @@ impl EncodedSums {
 
     /// Bytes of all of them as they are stored.
     pub fn stored_bytes(&self) -> usize {
-        self.content.iter().flatten().map(Bytes::len).sum()
+        self.content.stored_bytes()
     }
 
-    /// Decodes one record after the other and hands over its place among those asked for; those that hold nothing, neither of
-    /// their block nor of any west of it, are left out. `take` says whether to go on.
+    /// Decodes one record after the other, in the order asked for, and hands over its place among those asked for; those that hold
+    /// nothing, neither of their block nor of any west of it, are left out. `take` says whether to go on. Squares of a record are those of
+    /// another one unless they are wanted.
     ///
     /// # Errors
     /// The first one that is damaged; [`EncodedSums::error`] makes an error of it.
-    pub fn each(&self, mut take: impl FnMut(usize, &Record) -> bool) -> Result<(), Undecoded> {
-        let decoder = ChunkDecoder::new(RECORD_BYTES);
+    pub fn each(
+        &self,
+        with_squares: bool,
+        mut take: impl FnMut(usize, &Record) -> bool,
+    ) -> Result<(), Undecoded> {
+        let decoder = ChunkDecoder::new();
         let mut decoder = decoder.map_err(|reason| Undecoded(0, reason))?;
-        let mut record = Record::default();
-        for (number, content) in self.content.iter().enumerate() {
-            let Some(content) = content else { continue };
-            let read = decoder.decode(content).and_then(|own| record.read(own));
+        let (mut bytes, mut record) = (vec![0; RECORD_BYTES], Record::default());
+        self.content.in_order(|number, content| {
+            let read = decoder.decode(content, &mut bytes);
+            let read = read.and_then(|()| record.read(&bytes, with_squares));
             read.map_err(|reason| Undecoded(number, reason))?;
-            if !take(number, &record) {
-                break;
-            }
-        }
-        Ok(())
+            Ok(take(number, &record))
+        })
     }
 
     /// The error of a record that cannot be decoded, which names its object.

@@ -42,6 +42,7 @@ pub mod scale;
 mod series;
 mod staged;
 mod state;
+mod stored_chunks;
 mod summing;
 mod sums;
 mod unreadable;

@@ -9,6 +9,7 @@
 
 use std::fmt::{Debug, Display, Formatter};
 use std::ops::Range;
+use std::path::PathBuf;
 use std::pin::Pin;
 
 use async_trait::async_trait;
@@ -59,6 +60,12 @@ impl ObjectStorage {
     fn key(&self, name: &str) -> StorageResult<ObjectKey> {
         let key = self.path(name).parse();
         key.map_err(|e: contract::ContractError| other(&e))
+    }
+
+    /// The file of a chunk that the repository names so, where there is one to read from.
+    pub(crate) fn file(&self, chunk: &str) -> Option<PathBuf> {
+        let key = self.path(&format!("chunks/{chunk}")).parse().ok()?;
+        self.store.file(&key)
     }
 
     /// Parts of a chunk that the repository names so, in the order of their ranges.

@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use bytes::Bytes;
 use contract::chunk::Window;
 use contract::digest::Digest;
 use contract::level::{self, Level};
@@ -19,6 +18,7 @@ use crate::levels::Levels;
 use crate::maps::Maps;
 use crate::object_storage::ObjectStorage;
 use crate::series::Runs;
+use crate::stored_chunks::StoredChunks;
 use crate::sums::Sums;
 use crate::{CubeError, Description, Layout, Step, arrays, axis};
 
@@ -304,13 +304,13 @@ impl Cube {
     }
 
     /// Blocks of a run that [`Self::run_of`] gave, as they are stored.
-    pub(crate) async fn encoded(
+    pub(crate) async fn stored_blocks(
         &self,
         run: usize,
         blocks: &[[u32; 2]],
-    ) -> Result<Vec<Option<Bytes>>, CubeError> {
+    ) -> Result<StoredChunks, CubeError> {
         match &self.0.blocks {
-            Some(own) => own.encoded(run, blocks).await,
+            Some(own) => own.stored(run, blocks).await,
             None => Err(self.no_run(run)),
         }
     }
@@ -350,9 +350,9 @@ impl Cube {
         &self,
         run: usize,
         blocks: &[[u32; 2]],
-    ) -> Result<Vec<Option<Bytes>>, CubeError> {
+    ) -> Result<StoredChunks, CubeError> {
         match &self.0.records {
-            Some(own) => own.encoded(run, blocks).await,
+            Some(own) => own.stored(run, blocks).await,
             None => Err(self.no_run(run)),
         }
     }

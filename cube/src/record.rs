@@ -66,11 +66,11 @@ impl Record {
         put(16, &|step, place| self.squares[step].to_le_bytes()[place]);
     }
 
-    /// Reads one of [`RECORD_BYTES`] bytes.
+    /// Reads one of [`RECORD_BYTES`] bytes; squares stay what they are unless they are wanted.
     ///
     /// # Errors
     /// It begins as no record does.
-    pub(crate) fn read(&mut self, bytes: &[u8]) -> Result<(), String> {
+    pub(crate) fn read(&mut self, bytes: &[u8], with_squares: bool) -> Result<(), String> {
         self.is_summed = match bytes.first() {
             Some(0) => true,
             Some(&UNSUMMED) => false,
@@ -80,15 +80,11 @@ impl Record {
                 ));
             }
         };
-        let mut planes = bytes[HEADER_BYTES..].chunks_exact(RUN_STEPS);
+        let mut rest = &bytes[HEADER_BYTES..];
         let mut word = |count: usize| {
-            let mut words = [0u64; RUN_STEPS];
-            for (place, plane) in planes.by_ref().take(count).enumerate() {
-                for (word, byte) in words.iter_mut().zip(plane) {
-                    *word |= u64::from(*byte) << (8 * place);
-                }
-            }
-            words
+            let (planes, others) = rest.split_at(count * RUN_STEPS);
+            rest = others;
+            words(planes)
         };
         self.valid.copy_from_slice(&word(8));
         for (own, count) in self.counts.iter_mut().zip(word(4)) {
@@ -97,7 +93,8 @@ impl Record {
         for (own, weight) in self.weights.iter_mut().zip(word(8)) {
             *own = weight.cast_signed();
         }
-        for sums in [&mut self.sums, &mut self.squares] {
+        let squares = with_squares.then_some(&mut self.squares);
+        for sums in [Some(&mut self.sums), squares].into_iter().flatten() {
             let (low, high) = (word(8), word(8));
             for (own, (low, high)) in sums.iter_mut().zip(low.into_iter().zip(high)) {
                 *own = i128::from(high.cast_signed()) << 64 | i128::from(low);
@@ -107,9 +104,56 @@ impl Record {
     }
 }
 
+/// Side of the squares of bytes that are turned at a time.
+const SIDE: usize = size_of::<u64>();
+
+/// Words of up to eight bytes, from planes of the lowest byte of all steps, the next one of all, and so on.
+fn words(planes: &[u8]) -> [u64; RUN_STEPS] {
+    let mut words = [0; RUN_STEPS];
+    for (at, words) in words.as_chunks_mut::<SIDE>().0.iter_mut().enumerate() {
+        let mut square = [0; SIDE];
+        for (row, plane) in square.iter_mut().zip(planes.as_chunks::<RUN_STEPS>().0) {
+            *row = u64::from_le_bytes(plane.as_chunks().0[at]);
+        }
+        *words = turned(square);
+    }
+    words
+}
+
+/// A square of bytes with its rows as columns: halves are exchanged, then quarters, then single bytes.
+fn turned(mut rows: [u64; SIDE]) -> [u64; SIDE] {
+    for (distance, mask) in [
+        (4, 0x0000_0000_FFFF_FFFF),
+        (2, 0x0000_FFFF_0000_FFFF),
+        (1, 0x00FF_00FF_00FF_00FF),
+    ] {
+        for row in (0..SIDE).filter(|row| row & distance == 0) {
+            let other = row + distance;
+            let exchanged = ((rows[row] >> (8 * distance)) ^ rows[other]) & mask;
+            rows[other] ^= exchanged;
+            rows[row] ^= exchanged << (8 * distance);
+        }
+    }
+    rows
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn words_are_made_of_the_bytes_of_their_planes() {
+        for count in [1, 4, 8] {
+            let planes: Vec<u8> = (0..count * RUN_STEPS)
+                .map(|at| (at * 7919 % 251) as u8)
+                .collect();
+            for (step, word) in words(&planes).into_iter().enumerate() {
+                let byte =
+                    |place: usize| u64::from(planes[place * RUN_STEPS + step]) << (8 * place);
+                assert_eq!(word, (0..count).map(byte).sum::<u64>(), "{count} {step}");
+            }
+        }
+    }
 
     #[test]
     fn bytes_lead_back_and_nothing_is_all_zeros() {
@@ -129,10 +173,14 @@ mod tests {
             own.is_summed = is_summed;
             own.write(&mut bytes);
             let mut back = Record::default();
-            back.read(&bytes).unwrap();
+            back.read(&bytes, true).unwrap();
             assert_eq!(back, own);
+            let mut without = Record::default();
+            without.read(&bytes, false).unwrap();
+            assert_eq!((&without.sums, &without.valid), (&own.sums, &own.valid));
+            assert_eq!(without.squares, Record::default().squares);
         }
         bytes[0] = 2;
-        assert!(Record::default().read(&bytes).is_err());
+        assert!(Record::default().read(&bytes, true).is_err());
     }
 }

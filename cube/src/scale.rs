@@ -73,6 +73,16 @@ impl Scale {
         f64::from(self.exponent).exp2()
     }
 
+    /// Value that is summed as 0, stored unit.
+    pub fn zero(self) -> f64 {
+        self.zero
+    }
+
+    /// Steps of the largest distance from the zero that can be summed.
+    pub fn most_steps() -> f64 {
+        LIMIT * f64::from(VALUE_BITS).exp2()
+    }
+
     /// What a value less the zero is multiplied with.
     #[inline]
     pub fn steps_per_value(self) -> f64 {

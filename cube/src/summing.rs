@@ -113,7 +113,7 @@ mod tests {
     fn read(records: &[u8], block: usize) -> Record {
         let mut own = Record::default();
         let bytes = &records[block * RECORD_BYTES..][..RECORD_BYTES];
-        own.read(bytes).unwrap();
+        own.read(bytes, true).unwrap();
         own
     }
 

@@ -6,10 +6,10 @@
 
 use std::cell::LazyCell;
 use std::collections::BTreeMap;
+use std::num::NonZeroUsize;
 use std::ops::Range;
 use std::sync::Arc;
 
-use bytes::Bytes;
 use contract::chunk::Window;
 use contract::kind::Vouched;
 use contract::manifest::Manifest;
@@ -22,6 +22,7 @@ use crate::field_bands::FieldBands;
 use crate::follow::folder;
 use crate::joined::joined_window;
 use crate::layout::{BLOCK_CELLS, RUN_STEPS};
+use crate::stored_chunks::StoredChunks;
 use crate::{At, Cube, CubeError, LevelWindow, Repository};
 
 /// Runs that are read at a time.
@@ -93,21 +94,6 @@ impl Block {
             self.values[cell * steps + step] = *value;
         }
     }
-
-    /// Puts the values of a run in, `[cell, step]` of a whole block, as far as its steps are asked for.
-    fn put_run(&mut self, run: &[f32], pieces: &[Piece], steps: usize) {
-        let Window { row, col, cols, .. } = self.window;
-        let (top, left) = (row % BLOCK_CELLS, col % BLOCK_CELLS);
-        for cell in 0..self.window.cell_count() {
-            let (down, right) = (cell as u32 / cols, cell as u32 % cols);
-            let in_block = ((top + down) * BLOCK_CELLS + left + right) as usize;
-            for piece in pieces {
-                let from = in_block * RUN_STEPS + piece.in_run;
-                let to = cell * steps + piece.asked;
-                self.values[to..to + piece.count].copy_from_slice(&run[from..from + piece.count]);
-            }
-        }
-    }
 }
 
 /// Steps side by side in a run that are side by side among those asked for.
@@ -126,7 +112,7 @@ pub struct EncodedBlocks {
     cube: Cube,
     run: usize,
     at: Vec<[u32; 2]>,
-    content: Vec<Option<Bytes>>,
+    content: StoredChunks,
     pieces: Vec<Piece>,
 }
 
@@ -140,7 +126,7 @@ impl EncodedBlocks {
         &self.pieces
     }
 
-    /// Decodes one block after the other and hands over its place among those asked for and its values, `[cell, step]` of 8 x 8
+    /// Reads and decodes one block after the other, as they lie in their shards, and hands over its place among those asked for and its values, `[cell, step]` of 8 x 8
     /// cells and [`RUN_STEPS`](crate::RUN_STEPS) steps, stored unit, NaN no data; those without any data are left out. `take` says whether to go on.
     ///
     /// # Errors
@@ -148,15 +134,11 @@ impl EncodedBlocks {
     pub fn each(&self, mut take: impl FnMut(usize, &[f32]) -> bool) -> Result<(), Undecoded> {
         let decoder = BlockDecoder::new();
         let mut decoder = decoder.map_err(|reason| Undecoded(0, reason))?;
-        for (number, content) in self.content.iter().enumerate() {
-            let Some(content) = content else { continue };
+        self.content.each(|number, content| {
             let values = decoder.decode(content);
             let values = values.map_err(|reason| Undecoded(number, reason))?;
-            if !take(number, values) {
-                break;
-            }
-        }
-        Ok(())
+            Ok(take(number, values))
+        })
     }
 
     /// The error of a block that cannot be decoded, which names its object.
@@ -177,6 +159,15 @@ struct Reads {
     maps: Vec<(usize, usize, usize)>,
     /// Step of the version, asked step.
     fields: Vec<(usize, usize)>,
+}
+
+impl Reads {
+    /// Takes steps that lie side by side in a run.
+    fn take(&mut self, piece: Option<((usize, usize), Piece)>) {
+        if let Some((run, piece)) = piece {
+            self.runs.entry(run).or_default().push(piece);
+        }
+    }
 }
 
 impl Values {
@@ -400,7 +391,7 @@ impl Values {
             let Some((cube, run, pieces)) = self.run_of(&steps) else {
                 return Ok(None);
             };
-            let content = cube.encoded(run, blocks).await?;
+            let content = cube.stored_blocks(run, blocks).await?;
             Ok(Some(EncodedBlocks {
                 cube,
                 run,
@@ -438,31 +429,43 @@ impl Values {
     /// Where the asked steps are.
     fn reads(&self, steps: &Range<usize>) -> Reads {
         let mut reads = Reads::default();
+        // Steps side by side are mostly of one run.
+        let mut last = None;
         for (asked, step) in steps.clone().enumerate() {
-            match self.0.places[step] {
-                Place::Field => reads.fields.push((step, asked)),
-                Place::Cube { cube, step } => match self.0.cubes[cube].run_of(step) {
-                    None => reads.maps.push((cube, step, asked)),
-                    Some(run) => {
-                        let in_run = step % RUN_STEPS;
-                        let pieces = reads.runs.entry((cube, run)).or_default();
-                        match pieces.last_mut() {
-                            Some(last)
-                                if last.in_run + last.count == in_run
-                                    && last.asked + last.count == asked =>
-                            {
-                                last.count += 1;
-                            }
-                            _ => pieces.push(Piece {
-                                in_run,
-                                asked,
-                                count: 1,
-                            }),
-                        }
-                    }
-                },
+            let Place::Cube { cube, step } = self.0.places[step] else {
+                reads.fields.push((step, asked));
+                continue;
+            };
+            let Some(run) = self.0.cubes[cube].run_of(step) else {
+                reads.maps.push((cube, step, asked));
+                continue;
+            };
+            let in_run = step % RUN_STEPS;
+            match &mut last {
+                Some((
+                    own,
+                    Piece {
+                        in_run: first,
+                        asked: begun,
+                        count,
+                    },
+                )) if *own == (cube, run)
+                    && *first + *count == in_run
+                    && *begun + *count == asked =>
+                {
+                    *count += 1;
+                }
+                last => {
+                    let piece = Piece {
+                        in_run,
+                        asked,
+                        count: 1,
+                    };
+                    reads.take(last.replace(((cube, run), piece)));
+                }
             }
         }
+        reads.take(last);
         reads
     }
 
@@ -478,26 +481,21 @@ impl Values {
         let asked: Vec<[u32; 2]> = blocks.iter().map(|block| block.at).collect();
         let windows: Vec<Window> = blocks.iter().map(|block| block.window).collect();
         let asked = &asked;
-        let read = |((cube, run), pieces): ((usize, usize), Vec<Piece>)| async move {
-            let content = cubes[cube].encoded(run, asked).await?;
-            Ok::<_, CubeError>((cube, run, pieces, content))
-        };
-        let mut found = stream::iter(reads.runs).map(read).buffered(RUNS_AT_ONCE);
-        while let Some((cube, run, pieces, content)) = found.try_next().await? {
-            let encoded = EncodedBlocks {
+        let find = |((cube, run), pieces): ((usize, usize), Vec<Piece>)| async move {
+            let content = cubes[cube].stored_blocks(run, asked).await?;
+            Ok::<_, CubeError>(EncodedBlocks {
                 cube: cubes[cube].clone(),
                 run,
                 at: asked.clone(),
                 content,
                 pieces,
-            };
-            // A few ten microseconds a block: not worth another thread.
-            let put = |number: usize, values: &[f32]| {
-                blocks[number].put_run(values, &encoded.pieces, steps.len());
-                true
-            };
-            if let Err(undecoded) = encoded.each(put) {
-                return Err(encoded.error(undecoded).await);
+            })
+        };
+        let found = stream::iter(reads.runs).map(find).buffered(RUNS_AT_ONCE);
+        let mut found = found.try_chunks(RUNS_AT_ONCE);
+        while let Some(runs) = found.try_next().await.map_err(|e| e.1)? {
+            for run in decoded(runs, &windows).await? {
+                run.put(blocks, steps.len());
             }
         }
         let windows = &windows;
@@ -528,6 +526,91 @@ impl Values {
         }
         Ok(())
     }
+}
+
+/// Values of blocks in the steps of a run that are asked for, `[cell, step]` of each window.
+struct DecodedRun {
+    pieces: Vec<Piece>,
+    /// By the number of a block; those without any data are left out.
+    blocks: Vec<(usize, Vec<f32>)>,
+}
+
+impl DecodedRun {
+    /// Of `windows` those cells that blocks have.
+    fn of(encoded: &EncodedBlocks, windows: &[Window]) -> Result<Self, Undecoded> {
+        let mut blocks = vec![];
+        encoded.each(|number, values| {
+            blocks.push((number, picked(values, windows[number], encoded.pieces())));
+            true
+        })?;
+        Ok(Self {
+            pieces: encoded.pieces.clone(),
+            blocks,
+        })
+    }
+
+    /// Puts its values among those of `steps` steps.
+    fn put(&self, blocks: &mut [Block], steps: usize) {
+        let own_steps = self.pieces.iter().map(|piece| piece.count).sum();
+        for (number, values) in &self.blocks {
+            let cells = values.chunks_exact(own_steps);
+            let targets = blocks[*number].values.chunks_exact_mut(steps);
+            for (target, mut values) in targets.zip(cells) {
+                for piece in &self.pieces {
+                    let (own, rest) = values.split_at(piece.count);
+                    target[piece.asked..piece.asked + piece.count].copy_from_slice(own);
+                    values = rest;
+                }
+            }
+        }
+    }
+}
+
+/// Values of the cells of a window of a block, `[cell, step]` of a whole one, as far as their steps are asked for.
+fn picked(values: &[f32], window: Window, pieces: &[Piece]) -> Vec<f32> {
+    let Window { row, col, cols, .. } = window;
+    let (top, left) = (row % BLOCK_CELLS, col % BLOCK_CELLS);
+    let mut picked = vec![];
+    for cell in 0..window.cell_count() {
+        let (down, right) = (cell as u32 / cols, cell as u32 % cols);
+        let in_block = ((top + down) * BLOCK_CELLS + left + right) as usize;
+        for piece in pieces {
+            let from = in_block * RUN_STEPS + piece.in_run;
+            picked.extend_from_slice(&values[from..from + piece.count]);
+        }
+    }
+    picked
+}
+
+/// Reads and decodes runs, on as many threads as there are processors: a thread a run would take longer to begin than to decode.
+async fn decoded(
+    runs: Vec<EncodedBlocks>,
+    windows: &[Window],
+) -> Result<Vec<DecodedRun>, CubeError> {
+    let threads = std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
+    let each = runs.len().div_ceil(threads).max(1);
+    let (runs, windows): (Arc<[EncodedBlocks]>, Arc<[Window]>) = (runs.into(), windows.into());
+    let part = |from: usize| {
+        let (runs, windows) = (Arc::clone(&runs), Arc::clone(&windows));
+        tokio::task::spawn_blocking(move || {
+            let own = from..runs.len().min(from + each);
+            let decoded = own.map(|run| {
+                let decoded = DecodedRun::of(&runs[run], &windows);
+                decoded.map_err(|undecoded| (run, undecoded))
+            });
+            decoded.collect::<Result<Vec<DecodedRun>, _>>()
+        })
+    };
+    let parts: Vec<_> = (0..runs.len()).step_by(each).map(part).collect();
+    let mut all = vec![];
+    for part in parts {
+        let part = part.await;
+        match part.map_err(|e| CubeError::library("a thread", "decoding values", &e))? {
+            Ok(decoded) => all.extend(decoded),
+            Err((run, undecoded)) => return Err(runs[run].error(undecoded).await),
+        }
+    }
+    Ok(all)
 }
 
 impl Inner {

@@ -26,11 +26,19 @@ impl WeightUnit {
 
     /// The nearest number of steps, but at least one of what there is.
     pub fn steps(self, weight: f64) -> i64 {
-        if weight > 0.0 {
-            // A power of two: to multiply with the reciprocal is as exact.
-            nearest(weight * (1.0 / self.size())).max(1)
-        } else {
-            0
+        self.counting()(weight)
+    }
+
+    /// The same of many weights: what they have in common is worked out once.
+    pub fn counting(self) -> impl Fn(f64) -> i64 + Copy {
+        // A power of two: to multiply with the reciprocal is as exact.
+        let per_step = 1.0 / self.size();
+        move |weight| {
+            if weight > 0.0 {
+                nearest(weight * per_step).max(1)
+            } else {
+                0
+            }
         }
     }
 }

@@ -2,6 +2,7 @@
 //! there, and takes the place of nothing.
 
 mod columnar;
+mod columns;
 mod netcdf;
 mod shown;
 mod text;
@@ -15,6 +16,7 @@ use tempfile::NamedTempFile;
 
 use crate::{ExportError, part_of};
 
+pub use columns::encoded;
 pub use shown::{ShownColumn, shown_columns, shown_rows};
 
 /// A form of rows.

@@ -16,8 +16,10 @@ use contract::geometry::Geometry;
 use contract::grid::LonLatDeg;
 use contract::job::RenderJob;
 use contract::manifest::{Manifest, ManifestId};
+use contract::rows::{Columns, RowsForm};
 use contract::series::{PointSeries, RegionSeries, RegionSeriesQuery};
 use contract::statistics::{StatisticsAnswer, StatisticsQuery};
+use export::answer::AnswerFormat;
 use render_worker::Desk;
 use render_worker::desk::{DeskError, Order, Storing};
 use render_worker::fleet::{Fleet, FleetError};
@@ -195,6 +197,16 @@ impl Analyse for Analyst {
             }
         };
         made.map_err(compute_failed)
+    }
+
+    fn encoded(&self, columns: &Columns, form: RowsForm) -> Result<Vec<u8>, BackendError> {
+        let format = match form {
+            RowsForm::Json => AnswerFormat::Json,
+            RowsForm::Csv => AnswerFormat::Csv,
+            RowsForm::Arrow => AnswerFormat::Arrow,
+        };
+        let content = export::answer::encoded(columns, format);
+        content.map_err(|error| BackendError::new(Class::Internal, error.to_string()))
     }
 
     async fn check(&self) -> Result<Option<Check>, BackendError> {

@@ -6,7 +6,9 @@ counts, its weights made before it is timed; ours are made within the time. Both
 `cold`: ours by a server that was just started, theirs in the same layout, each with its files out of the page cache (what the
 disk itself keeps is not in our hands). Answers of both are compared before any figure is printed.
 
-Every question of ours is a new one, over a place that was not asked for before; `again` asks the same a second time. A hundred
+Every question of ours is a new one, over a place that was not asked for before; `again` asks the same a second time. Ours come as
+Arrow and are timed until they are arrays, as the peer's are; the lines `as JSON` are those of the text with a name for each number of each
+row, asked for over other places. Both are asked through one connection that stays open. A hundred
 polygons at once are compared with exactextract, which is run once a step; a part of the steps is timed, and the rest reckoned.
 No vertex of these lies on a line between cells: exactextract 0.3.0 may lose a whole cell there, as shapely shows.
 
@@ -15,6 +17,7 @@ No vertex of these lies on a line between cells: exactextract 0.3.0 may lose a w
 """
 
 import argparse
+import http.client
 import json
 import math
 import os
@@ -23,7 +26,6 @@ import sys
 import tempfile
 import time
 import urllib.parse
-import urllib.request
 from pathlib import Path
 
 import tiles
@@ -206,36 +208,56 @@ class Ours:
             stderr=subprocess.DEVNULL,
         )
         tiles.wait_for(self.port, "/readyz")
+        self.connection = http.client.HTTPConnection("127.0.0.1", self.port)
 
     def stop(self):
+        self.connection.close()
         self.process.terminate()
         self.process.wait(timeout=60)
 
-    def ask(self, what, **parameters):
-        query = urllib.parse.urlencode(parameters)
+    def ask(self, what, form, **parameters):
+        """Seconds until the answer is here, as arrays if it is Arrow, and it."""
+        query = urllib.parse.urlencode({**parameters, "format": form})
         begin = time.perf_counter()
-        content = tiles.get(self.port, f"/api/products/{self.product}/{what}?{query}")
-        return time.perf_counter() - begin, content
+        self.connection.request("GET", f"/api/products/{self.product}/{what}?{query}")
+        response = self.connection.getresponse()
+        content = response.read()
+        if response.status != 200:
+            sys.exit(f"{what}: {response.status}: {content[:300]}")
+        answer = arrays(content) if form == "arrow" else content
+        return time.perf_counter() - begin, answer
 
     def new(self, what, variants):
-        """Questions that are new: their median, the last one asked again, the first one asked cold, and its answer."""
-        times, first = [], None
-        for parameters in variants:
-            seconds, content = self.ask(what, **parameters)
-            times.append(seconds)
-            first = first or json.loads(content)
-        again = min(self.ask(what, **variants[-1])[0] for _ in range(3))
+        """Questions that are new, the one half as Arrow, the other as JSON: of each the median, and the last one asked again; the first
+        one asked cold, and its answer."""
+        half = len(variants) // 2
+        found, first = {}, None
+        for form, own in (("arrow", variants[:half]), ("json", variants[half:])):
+            times = []
+            for parameters in own:
+                seconds, answer = self.ask(what, form, **parameters)
+                times.append(seconds)
+                first = first or answer
+            again = min(self.ask(what, form, **own[-1])[0] for _ in range(3))
+            found[form] = [sorted(times)[len(times) // 2], again]
         self.stop()
         evict(self.folder)
         self.start()
-        cold = self.ask(what, **variants[0])[0]
-        return sorted(times)[len(times) // 2], again, cold, first
+        cold = self.ask(what, "arrow", **variants[0])[0]
+        return {"answer": first, "arrow": found["arrow"], "cold": cold, "json": found["json"]}
 
 
-def values_of(answer, name="mean"):
-    if "series" in answer:
-        return [step["value"] for step in answer["series"]]
-    return [row["values"][name] for row in answer["rows"]]
+def arrays(content):
+    """Columns of an answer by their names."""
+    import pyarrow as pa
+
+    table = pa.ipc.open_file(pa.BufferReader(content)).read_all()
+    return {name: table[name].to_numpy() for name in table.column_names}
+
+
+def values_of(answer):
+    values = answer["value" if "value" in answer else "mean"]
+    return [None if math.isnan(value) else value for value in values]
 
 
 def compared(name, ours, theirs):
@@ -256,17 +278,18 @@ def compared(name, ours, theirs):
 
 def row(name, ours, peer, differ):
     seconds, layout, _answer, cold = peer
-    own = {"ours_s": ours[0], "again_s": ours[1], "cold_s": ours[2]}
+    own = {"ours_s": ours["arrow"][0], "again_s": ours["arrow"][1], "cold_s": ours["cold"]}
+    own["json_s"], own["json_again_s"] = ours["json"]
     return {"question": name, **own, "peer_s": seconds, "peer_cold_s": cold, "layout": layout, "differ": differ}
 
 
 def point(ours, peer):
     tiles.say("a point")
-    places = [(114.0333 + 0.2 * at, 14.0333 + 0.2 * at) for at in range(REPEATS)]
+    places = [(114.0333 + 0.1 * at, 14.0333 + 0.1 * at) for at in range(2 * REPEATS)]
     own = ours.new("point", [{"lon": lon, "lat": lat} for lon, lat in places])
     lon, lat = places[0]
     other = peer.best(lambda cube: cube.sel(lon=lon, lat=lat, method="nearest").values)
-    return row("point, all steps", own, other, compared("point", values_of(own[3]), other[2]))
+    return row("point, all steps", own, other, compared("point", values_of(own["answer"]), other[2]))
 
 
 def line(ours, peer):
@@ -280,7 +303,7 @@ def line(ours, peer):
         return np.round(108 + shift + 10 * at, 4), np.round(18.5 + shift - 8 * at + 0.8 * np.sin(25 * at), 4)
 
     texts = []
-    for number in range(REPEATS):
+    for number in range(2 * REPEATS):
         lon, lat = vertices(0.05 * number)
         texts.append(";".join(f"{x:.4f},{y:.4f}" for x, y in zip(lon, lat)))
     own = ours.new("line", [{"line": text, "step": "native", "statistic": "mean"} for text in texts])
@@ -290,7 +313,7 @@ def line(ours, peer):
     places = {"lat": xr.DataArray(rows, dims="cell"), "lon": xr.DataArray(cols, dims="cell")}
     share = xr.DataArray(shares, dims="cell")
     other = peer.best(lambda cube: cube.isel(**places).drop_vars(["lat", "lon"]).weighted(share).mean("cell").values)
-    return row("line of 500 vertices, all steps", own, other, compared("line", values_of(own[3]), other[2]))
+    return row("line of 500 vertices, all steps", own, other, compared("line", values_of(own["answer"]), other[2]))
 
 
 def line_weights(peer, lon, lat):
@@ -343,18 +366,18 @@ def polygon_weights(peer, ring):
 
 def polygon(ours, peer):
     tiles.say("a polygon")
-    rings = [outline(0.021 * at) for at in range(REPEATS)]
+    rings = [outline(0.021 * at) for at in range(2 * REPEATS)]
     texts = ["POLYGON((" + ",".join(f"{x} {y}" for x, y in [*ring, ring[0]]) + "))" for ring in rings]
     own = ours.new("area", [{"region": text, "statistic": "mean", "step": "native"} for text in texts])
     rows, cols, weights, cells = polygon_weights(peer, rings[0])
     other = peer.best(peer.weighted_mean(rows, cols, weights))
-    return row(f"polygon of {cells} cells, all steps", own, other, compared("polygon", values_of(own[3]), other[2]))
+    return row(f"polygon of {cells} cells, all steps", own, other, compared("polygon", values_of(own["answer"]), other[2]))
 
 
 def polygon_year(ours, peer):
     """The last year of it alone."""
     tiles.say("a polygon, one year")
-    rings = [outline(0.013 + 0.023 * at) for at in range(REPEATS)]
+    rings = [outline(0.013 + 0.023 * at) for at in range(2 * REPEATS)]
     texts = ["POLYGON((" + ",".join(f"{x} {y}" for x, y in [*ring, ring[0]]) + "))" for ring in rings]
     period = {"from": "2010", "to": "2011"} if peer.steps > 365 else {}
     own = ours.new("area", [{"region": text, "statistic": "mean", "step": "native", **period} for text in texts])
@@ -362,7 +385,7 @@ def polygon_year(ours, peer):
     mean = peer.weighted_mean(rows, cols, weights)
     year = slice(365, 730) if peer.steps > 365 else slice(None)
     other = peer.best(lambda cube: mean(cube[year]))
-    return row(f"polygon of {cells} cells, 365 steps", own, other, compared("polygon, a year", values_of(own[3]), other[2]))
+    return row(f"polygon of {cells} cells, 365 steps", own, other, compared("polygon, a year", values_of(own["answer"]), other[2]))
 
 
 def hundred_polygons(ours, peer):
@@ -381,14 +404,16 @@ def hundred_polygons(ours, peer):
     texts = ["POLYGON((" + ",".join(f"{x} {y}" for x, y in [*ring, ring[0]]) + "))" for ring in rings]
     asked = [{"region": text, "statistic": "mean", "step": "native"} for text in texts]
 
-    def all_of_them():
+    def all_of_them(form):
         begin = time.perf_counter()
-        answers = [ours.ask("area", **one)[1] for one in asked]
+        answers = [ours.ask("area", form, **one)[1] for one in asked]
         return time.perf_counter() - begin, answers
 
-    first, answers = all_of_them()
-    again, _answers = all_of_them()
-    own = [values_of(json.loads(content)) for content in answers]
+    first, answers = all_of_them("arrow")
+    again, _answers = all_of_them("arrow")
+    json_known, _texts = all_of_them("json")
+    json_again, _texts = all_of_them("json")
+    own = [values_of(answer) for answer in answers]
 
     dlat, dlon = abs(peer.lat[1] - peer.lat[0]), peer.lon[1] - peer.lon[0]
     bounds = {
@@ -418,7 +443,8 @@ def hundred_polygons(ours, peer):
     for at in range(POLYGONS):
         means = [float(found[at]["properties"]["weighted_mean"]) for found in theirs]
         worst = max(worst, compared(f"polygon {at}", [own[at][step] for step in timed], means))
-    return row(f"{POLYGONS} polygons, all steps", (first, again, None), (seconds, "exactextract", None, None), worst)
+    measured = {"arrow": [first, again], "cold": None, "json": [json_known, json_again]}
+    return row(f"{POLYGONS} polygons, all steps", measured, (seconds, "exactextract", None, None), worst)
 
 
 def print_table(rows, builds, peer, options):
@@ -445,6 +471,11 @@ def print_table(rows, builds, peer, options):
             f"{times:6.1f}x {again:6.0f}x {ratio} {row_['differ']:9.1e}",
         ]
         print(" ".join(cells))
+        as_json = [row_[key] * 1e3 for key in ("json_s", "json_again_s")]
+        times, again = (row_["peer_s"] / row_[key] for key in ("json_s", "json_again_s"))
+        # Sums of a hundred regions are known by then: it is the text that is written.
+        what = "  its sums known, as JSON" if cold is None else "  as JSON"
+        print(f"{what:40} {as_json[0]:9.1f} ms {as_json[1]:7.1f} ms {'':67} {times:6.1f}x {again:6.0f}x")
 
 
 if __name__ == "__main__":

@@ -12,8 +12,9 @@ use contract::budget::{
 use contract::check::Check;
 use contract::digest::Digest;
 use contract::grid::LonLatDeg;
-use contract::series::{RegionSeries, RegionSeriesQuery};
-use contract::statistics::{StatisticsAnswer, StatisticsQuery};
+use contract::rows::{RowsForm, Tabular};
+use contract::series::RegionSeriesQuery;
+use contract::statistics::StatisticsQuery;
 use quick_cache::Weighter;
 use quick_cache::sync::Cache;
 
@@ -31,25 +32,16 @@ const BUDGETS: usize = 1000;
 const BUDGET_ROWS: u64 = 1 << 17;
 /// Histories of budgets remembered; one of 200 versions takes 60 KiB.
 const HISTORIES: usize = 100;
-/// Series of points remembered, a guess that sizes tables; one of 16 years of days takes 600 KiB.
-const POINTS: usize = 50;
-/// Bytes of all of them.
-const POINT_BYTES: u64 = 32 << 20;
-/// Series over regions remembered; one of 16 years of days takes 320 KiB.
-const AREAS: usize = 100;
+/// Answers about time that are remembered as the bytes that they are answered with, a guess that sizes tables; one of 16 years of days
+/// takes 100 KiB to 1.2 MiB.
+const TEXTS: usize = 200;
+/// Bytes of all of them: a hundred regions over 16 years of days.
+const TEXT_BYTES: u64 = 128 << 20;
 /// What is made of series and remembered; a Hovmöller diagram takes 8 MiB at most.
 const MADE_OF_SERIES: usize = 40;
 
-/// Statistics remembered, a guess that sizes tables.
-const STATISTICS: usize = 1000;
-/// Numbers in all of them, some 64 bytes each.
-const STATISTICS_NUMBERS: u64 = 1 << 20;
-
-/// Numbers of an answer.
-fn numbers(answer: &StatisticsAnswer) -> u64 {
-    // Instants and coverage of a row are some numbers too.
-    let a_row = answer.statistics.len() as u64 + 4;
-    answer.rows.len() as u64 * a_row + 1
+fn text_bytes(text: &Bytes) -> u64 {
+    text.len() as u64 + 1
 }
 
 /// Rows of an answer, those of its regions too.
@@ -82,10 +74,8 @@ pub struct Analyses {
     metrics: Metrics,
     budgets: Answers<BudgetAnswer>,
     histories: Answers<BudgetHistory>,
-    /// As the texts that they are answered with, which take longer to write than values take to read.
-    points: Answers<Bytes>,
-    areas: Answers<RegionSeries>,
-    statistics: Answers<StatisticsAnswer>,
+    /// Series and statistics as they are answered, which takes longer to write than values take to read.
+    texts: Answers<Bytes>,
     made_of_series: Answers<MadeOfSeries>,
 }
 
@@ -154,16 +144,19 @@ impl Analyses {
             metrics,
             budgets: Answers::new(BUDGETS, BUDGET_ROWS, budget_rows),
             histories: Answers::new(HISTORIES, HISTORIES as u64, |_one| 1),
-            points: Answers::new(POINTS, POINT_BYTES, |text| text.len() as u64),
-            areas: Answers::new(AREAS, AREAS as u64, |_one| 1),
-            statistics: Answers::new(STATISTICS, STATISTICS_NUMBERS, numbers),
+            texts: Answers::new(TEXTS, TEXT_BYTES, text_bytes),
             made_of_series: Answers::new(MADE_OF_SERIES, MADE_OF_SERIES as u64, |_one| 1),
         }
     }
 
-    /// The series of the cell at a place, a [`contract::series::PointSeries`] as JSON.
-    pub async fn point(&self, layer: &Layer, place: LonLatDeg) -> Result<Bytes, ServerError> {
-        let key = Digest::of_json(&("point", &layer.id, place));
+    /// The series of the cell at a place, a [`contract::series::PointSeries`], in a form.
+    pub async fn point(
+        &self,
+        layer: &Layer,
+        place: LonLatDeg,
+        form: RowsForm,
+    ) -> Result<Bytes, ServerError> {
+        let key = Digest::of_json(&("point", &layer.id, place, form));
         let (analyst, manifest) = (Arc::clone(&self.analyst), Arc::clone(&layer.manifest));
         let id = layer.id.clone();
         let computed = async move {
@@ -174,12 +167,18 @@ impl Analyses {
                     what: format!("the analyst gave {values} values for {steps} steps"),
                 });
             }
-            let text = serde_json::to_vec(&answer).map_err(|e| ServerError::Defect {
-                what: format!("a series that is no JSON: {e}"),
-            })?;
-            Ok::<_, ServerError>(Bytes::from(text))
+            written(&*analyst, &answer, form)
         };
-        let text = self.points.answer(key, &self.gate, &self.metrics, computed);
+        self.text(key, computed).await
+    }
+
+    /// Bytes of an answer.
+    async fn text(
+        &self,
+        key: Digest,
+        computed: impl Future<Output = Result<Bytes, ServerError>> + Send + 'static,
+    ) -> Result<Bytes, ServerError> {
+        let text = self.texts.answer(key, &self.gate, &self.metrics, computed);
         Ok(Bytes::clone(&*text.await?))
     }
 
@@ -211,29 +210,32 @@ impl Analyses {
             .await
     }
 
-    /// A series of `layer` over a region.
+    /// A series of `layer` over a region, a [`contract::series::RegionSeries`], in a form.
     pub async fn area(
         &self,
         layer: &Layer,
         query: RegionSeriesQuery,
-    ) -> Result<Arc<RegionSeries>, ServerError> {
+        form: RowsForm,
+    ) -> Result<Bytes, ServerError> {
         let ocean = query.ocean.as_ref().map(|ocean| ocean.id());
         let region = (&query.region, &query.region_name);
         let asked = (region, query.from, query.to, query.earth, ocean);
-        let key = Digest::of_json(&("area", &layer.id, asked));
+        let key = Digest::of_json(&("area", &layer.id, asked, form));
         let (analyst, manifest) = (Arc::clone(&self.analyst), Arc::clone(&layer.manifest));
-        let computed = async move { analyst.area(&manifest, &query).await };
-        self.areas
-            .answer(key, &self.gate, &self.metrics, computed)
-            .await
+        let computed = async move {
+            let answer = analyst.area(&manifest, &query).await?;
+            written(&*analyst, &answer, form)
+        };
+        self.text(key, computed).await
     }
 
-    /// Statistics of `layer` over a geometry.
+    /// Statistics of `layer` over a geometry, a [`contract::statistics::StatisticsAnswer`], in a form.
     pub async fn statistics(
         &self,
         layer: &Layer,
         query: StatisticsQuery,
-    ) -> Result<Arc<StatisticsAnswer>, ServerError> {
+        form: RowsForm,
+    ) -> Result<Bytes, ServerError> {
         let key = Digest::of_json(&(
             "statistics",
             &layer.id,
@@ -242,17 +244,59 @@ impl Analyses {
             (query.from, query.to),
             (query.earth, query.cells),
             query.ocean.as_ref().map(|ocean| ocean.id()),
+            form,
         ));
         let (analyst, manifest) = (Arc::clone(&self.analyst), Arc::clone(&layer.manifest));
         let id = layer.id.clone();
-        let computed = async move { analyst.statistics(&manifest, &id, &query).await };
-        self.statistics
-            .answer(key, &self.gate, &self.metrics, computed)
-            .await
+        let computed = async move {
+            let answer = analyst.statistics(&manifest, &id, &query).await?;
+            written(&*analyst, &answer, form)
+        };
+        self.text(key, computed).await
     }
 
     /// Our budgets beside published ones.
     pub async fn check(&self) -> Result<Option<Check>, ServerError> {
         Ok(self.analyst.check().await?)
+    }
+}
+
+/// An answer in a form.
+fn written(
+    analyst: &dyn Analyse,
+    answer: &dyn Tabular,
+    form: RowsForm,
+) -> Result<Bytes, ServerError> {
+    let content = match form {
+        RowsForm::Json => answer.json().map_err(|e| ServerError::Defect {
+            what: format!("an answer that is no JSON: {e}"),
+        })?,
+        RowsForm::Csv | RowsForm::Arrow => analyst.encoded(&answer.columns(), form)?,
+    };
+    Ok(Bytes::from(content))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[tokio::test]
+    async fn what_is_remembered_is_bounded_by_its_bytes() {
+        let registry = crate::metrics::Registry::new();
+        let metrics = Metrics::register(&registry).unwrap();
+        let gate = Gate::new(1, 1);
+        let answers: Answers<Bytes> = Answers::new(4, 1000, text_bytes);
+        for number in 0..50_u8 {
+            let computed = async move { Ok::<_, ServerError>(Bytes::from(vec![number; 300])) };
+            let key = Digest::of(&[number]);
+            let text = answers
+                .answer(key, &gate, &metrics, computed)
+                .await
+                .unwrap();
+            assert_eq!(text[0], number);
+            let held = answers.remembered.weight();
+            assert!(held <= 1000, "{held}");
+        }
+        assert!(answers.remembered.weight() >= 301, "nothing is remembered");
     }
 }

@@ -20,6 +20,7 @@ use contract::grid::LonLatDeg;
 use contract::job::RenderJob;
 use contract::manifest::{Manifest, ManifestId};
 use contract::observation::{Filter, Page, Platform, TrackPoint, TrackQuery};
+use contract::rows::{Columns, RowsForm};
 use contract::series::{PointSeries, RegionSeries, RegionSeriesQuery};
 use contract::statistics::{StatisticsAnswer, StatisticsQuery};
 use serde::Serialize;
@@ -171,6 +172,9 @@ pub trait Analyse: Send + Sync + 'static {
     /// What is made of series of versions of products.
     async fn made_of_series(&self, question: &SeriesQuestion)
     -> Result<MadeOfSeries, BackendError>;
+
+    /// Columns of an answer as the bytes of a form.
+    fn encoded(&self, columns: &Columns, form: RowsForm) -> Result<Vec<u8>, BackendError>;
 
     /// Our budgets beside published ones; none where this deployment has nothing to compare with.
     async fn check(&self) -> Result<Option<Check>, BackendError>;

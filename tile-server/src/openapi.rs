@@ -70,6 +70,7 @@ const RETRY_AFTER: &str = "Seconds after which the same request may succeed";
         contract::geometry::Sampling,
         contract::observation::PlatformKind,
         contract::region::Cells,
+        contract::rows::RowsForm,
         contract::time::TimeStep,
         words::Background,
         words::BaseMap,

@@ -45,12 +45,6 @@ impl Default for StepSums {
 const STEP_BYTES: usize = 4 + 8 + 4 * 16 + 2 * 4;
 
 impl StepSums {
-    /// The same as if nobody had looked for extremes.
-    pub(super) fn without_extremes(self) -> Self {
-        let Self { min, max, .. } = Self::default();
-        Self { min, max, ..self }
-    }
-
     /// Adds others. None if a sum leaves 128 bits.
     pub(super) fn merge(&mut self, other: &Self) -> Option<()> {
         self.count = self.count.checked_add(other.count)?;

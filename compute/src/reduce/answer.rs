@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 use contract::cited::Cited;
+use contract::digest::Digest;
 use contract::manifest::{Manifest, ManifestId};
 use contract::quantity::{Display, Quantity};
 use contract::statistics::{
@@ -179,9 +180,10 @@ impl Reduction<'_> {
         };
         let known = self.engine.objects().remembered();
         let (mut all, mut pieces, mut new) = (Accumulated::default(), vec![], vec![]);
-        let stored = question.in_stored_sums();
+        let (stored, own_name) = (question.in_stored_sums(), question.sums_name());
         for run in version.runs(self.steps.clone(), &weighed.cells(), stored) {
-            let name = run.name.and_then(|name| question.sums_name(&name));
+            let name = run.name.zip(own_name);
+            let name = name.map(|names| Digest::of_json(&names));
             if let Some(sums) = name.and_then(|name| known.get(&name)) {
                 let first = run.steps.start;
                 let own = sums.iter().map(|(step, sums)| (first + step, *sums));

@@ -48,9 +48,16 @@ pub(super) struct CellWeight {
 /// Rows and columns of a grid.
 pub(super) type Shape = [u32; 2];
 
-/// Windows of 8 x 8 cells of a grid, as values along time are cut.
-pub(super) fn blocks([rows, cols]: Shape) -> Vec<Window> {
-    contract::chunk::windows(&shape_only([rows, cols]), BLOCK_CELLS, BLOCK_CELLS)
+/// The window of a block of 8 x 8 cells, as values along time are cut: those of its cells that the grid has.
+pub(super) fn block_window([rows, cols]: Shape, number: u32) -> Window {
+    let across = cols.div_ceil(BLOCK_CELLS).max(1);
+    let (row, col) = (number / across * BLOCK_CELLS, number % across * BLOCK_CELLS);
+    Window {
+        row,
+        col,
+        rows: BLOCK_CELLS.min(rows.saturating_sub(row)),
+        cols: BLOCK_CELLS.min(cols.saturating_sub(col)),
+    }
 }
 
 /// Windows of chunks of a grid, as fields are cut.
@@ -98,12 +105,13 @@ impl Cells<'_> {
     /// Weights of the cells of a window, row-major.
     pub(super) fn window(&self, window: Window) -> Vec<CellWeight> {
         let mut cells = vec![CellWeight::default(); window.cell_count()];
+        let steps = self.unit.counting();
         for (row, own) in (window.row..).zip(cells.chunks_exact_mut(window.cols as usize)) {
             self.fill(self.whole, row, window.col, own, |cell, weight| {
-                cell.weight = self.unit.steps(weight);
+                cell.weight = steps(weight);
             });
             self.fill(self.covered, row, window.col, own, |cell, weight| {
-                cell.covered = self.unit.steps(weight);
+                cell.covered = steps(weight);
             });
         }
         cells
@@ -203,7 +211,11 @@ mod tests {
             unit: unit_of_largest(&whole),
         };
         let step = cells.unit.size();
-        for window in blocks(shape).into_iter().chain(chunks(shape)) {
+        let blocks = contract::chunk::windows(&grid, BLOCK_CELLS, BLOCK_CELLS);
+        let numbers = 0..blocks.len() as u32;
+        let own: Vec<Window> = numbers.map(|number| block_window(shape, number)).collect();
+        assert_eq!(own, blocks);
+        for window in blocks.iter().copied().chain(chunks(shape)) {
             let found = cells.window(window);
             assert_eq!(found.len(), window.cell_count());
             for (cell, own) in window.cell_indices(&grid).zip(found) {
@@ -211,7 +223,7 @@ mod tests {
                 assert_eq!(own.covered, (weight(cell) * 0.5 / step) as i64);
             }
         }
-        let all: Vec<u32> = (0..blocks(shape).len() as u32).collect();
+        let all: Vec<u32> = (0..blocks.len() as u32).collect();
         assert_eq!(cells.blocks(), all);
     }
 

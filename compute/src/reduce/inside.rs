@@ -4,7 +4,7 @@ use contract::chunk::Window;
 use cube::{BLOCK_CELLS, Basis};
 use serde::{Deserialize, Serialize};
 
-use super::cells::{CellWeight, Cells, blocks};
+use super::cells::{CellWeight, Cells, block_window};
 
 /// Blocks side by side in a shard that lie inside of a geometry.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -46,11 +46,10 @@ pub(super) struct Inside {
 impl Inside {
     /// Parts the blocks of a geometry, whose numbers increase.
     pub(super) fn of(cells: &Cells<'_>, numbers: &[u32], basis: &Basis) -> Self {
-        let windows = blocks(cells.shape);
         let across = cells.shape[1].div_ceil(BLOCK_CELLS);
         let mut own = Self::default();
         for &number in numbers {
-            let window = windows[number as usize];
+            let window = block_window(cells.shape, number);
             let weights = cells.window(window);
             if !is_whole(&weights, window, basis) {
                 own.rim.push(number);

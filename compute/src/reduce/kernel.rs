@@ -1,10 +1,15 @@
 //! Array kernels: values of some cells at some steps and the cells' weights in, sums by step or histograms out.
 
+mod lanes;
+mod totals;
+
 use std::ops::Range;
 
 use cube::BLOCK_CELLS;
 use cube::scale::Scale;
 
+use self::lanes::{ByStep, Steps};
+use self::totals::Totals;
 use super::accumulator::StepSums;
 use super::cells::CellWeight;
 use super::histogram::{Buckets, Histograms};
@@ -18,96 +23,46 @@ struct Equal {
     cell_count: usize,
     counts: Vec<i64>,
     sums: Vec<i64>,
+    /// Nothing where they are not wanted.
     squares: Vec<i64>,
-    mins: Vec<f32>,
-    maxs: Vec<f32>,
 }
 
 /// Cells that are summed before they are multiplied: a value is below 2⁴⁵ steps, a square below 2⁵⁰.
 const MOST_CELLS: usize = 1 << 12;
 
 impl Equal {
-    fn clear(&mut self, steps: usize) {
+    fn clear(&mut self, steps: usize, with_squares: bool) {
         self.cell_count = 0;
-        for sums in [&mut self.counts, &mut self.sums, &mut self.squares] {
+        let squares = if with_squares { steps } else { 0 };
+        for (sums, steps) in [
+            (&mut self.counts, steps),
+            (&mut self.sums, steps),
+            (&mut self.squares, squares),
+        ] {
             sums.clear();
             sums.resize(steps, 0);
         }
-        self.mins.clear();
-        self.mins.resize(steps, f32::INFINITY);
-        self.maxs.clear();
-        self.maxs.resize(steps, f32::NEG_INFINITY);
     }
 
-    /// Adds a cell's run of steps.
-    fn add(&mut self, values: &[f32], scale: Scale, with_squares: bool) {
+    /// Adds a cell's run of steps; is a value among them that cannot be summed?
+    fn add(&mut self, values: &[f32], steps: Steps) -> bool {
         self.cell_count += 1;
-        let own = self.counts.iter_mut().zip(&mut self.sums);
-        for ((count, sum), value) in own.zip(values) {
-            let is_there = !value.is_nan();
-            let steps = scale.steps(*value);
-            // What is beyond anything physical is found when the extremes are looked at.
-            *sum = sum.wrapping_add(if is_there { steps } else { 0 });
-            *count += i64::from(is_there);
-        }
-        for ((min, max), value) in self.mins.iter_mut().zip(&mut self.maxs).zip(values) {
-            *min = if *value < *min { *value } else { *min };
-            *max = if *value > *max { *value } else { *max };
-        }
-        if with_squares {
-            for (sum, value) in self.squares.iter_mut().zip(values) {
-                let square = scale.square_steps(*value);
-                *sum = sum.wrapping_add(if value.is_nan() { 0 } else { square });
-            }
-        }
+        let mut to = ByStep {
+            counts: &mut self.counts,
+            steps: &mut self.sums,
+            squares: &mut self.squares,
+        };
+        lanes::add(values, steps, &mut to)
     }
 
-    /// Adds what was added up to `out`, with the cells' weight.
-    fn flush(
-        &mut self,
-        scale: Scale,
-        with_squares: bool,
-        out: &mut [StepSums],
-    ) -> Result<(), OutOfRange> {
+    /// Adds what was added up to the totals of the steps from `first` on, with the cells' weight.
+    fn flush(&mut self, first: usize, totals: &mut Totals) {
         if self.cell_count == 0 {
-            return Ok(());
+            return;
         }
-        self.check(scale)?;
-        let CellWeight { weight, covered } = self.weight;
-        for (step, own) in out.iter_mut().enumerate() {
-            // Below 2⁵⁰: as many cells as are summed, of a weight each.
-            let count = self.counts[step];
-            own.count += count.unsigned_abs();
-            own.weight += i128::from(count * weight);
-            own.covered += i128::from(count * covered);
-            own.sum += i128::from(self.sums[step]) * i128::from(weight);
-            own.min = own.min.min(self.mins[step]);
-            own.max = own.max.max(self.maxs[step]);
-        }
-        if with_squares {
-            for (own, squares) in out.iter_mut().zip(&self.squares) {
-                own.squares += i128::from(*squares) * i128::from(weight);
-            }
-        }
-        self.clear(out.len());
-        Ok(())
-    }
-
-    /// Is there nothing beyond anything physical?
-    fn check(&self, scale: Scale) -> Result<(), OutOfRange> {
-        let low = self.mins.iter().copied().fold(f32::INFINITY, f32::min);
-        let high = self.maxs.iter().copied().fold(f32::NEG_INFINITY, f32::max);
-        if low > high || (scale.holds(low) && scale.holds(high)) {
-            return Ok(());
-        }
-        for (step, count) in self.counts.iter().enumerate() {
-            for value in [self.mins[step], self.maxs[step]] {
-                if *count > 0 && !scale.holds(value) {
-                    return Err(OutOfRange(value.into()));
-                }
-            }
-        }
-        Ok(())
+        let sums = [&self.counts[..], &self.sums, &self.squares];
+        totals.add(first, self.cell_count, self.weight, sums);
+        self.clear(self.counts.len(), !self.squares.is_empty());
     }
 }
 
@@ -118,26 +73,31 @@ const ROWS: usize = BLOCK_CELLS as usize;
 ///
 /// A value counts as the nearest step of its scale, times the whole number that its cell weighs: integers, so that the order
 /// of cells does not matter. Neighbours of equal weight are summed before they are multiplied, across blocks that lie
-/// side by side too.
+/// side by side too; a cell that no neighbour weighs the same as, where a geometry ends, is multiplied by itself.
 #[derive(Debug)]
 pub(super) struct Summing {
     scale: Scale,
+    steps_of: Steps,
     with_squares: bool,
-    out: Vec<StepSums>,
+    totals: Totals,
     /// Steps that are being added to.
     steps: Range<usize>,
     rows: [Equal; ROWS],
+    alone: Equal,
 }
 
 impl Summing {
     /// Of so many steps.
-    pub(super) fn new(steps: usize, scale: Scale, with_squares: bool) -> Self {
+    pub(super) fn new(steps: usize, scale: Scale, wanted: [bool; 2]) -> Self {
+        let [with_squares, with_extremes] = wanted;
         Self {
             scale,
+            steps_of: Steps::of(scale),
             with_squares,
-            out: vec![StepSums::default(); steps],
+            totals: Totals::new(steps, with_extremes),
             steps: 0..0,
             rows: Default::default(),
+            alone: Equal::default(),
         }
     }
 
@@ -152,46 +112,51 @@ impl Summing {
         steps: Range<usize>,
     ) -> Result<(), OutOfRange> {
         if self.steps != steps {
-            self.flush()?;
-            for row in &mut self.rows {
-                row.clear(steps.len());
+            self.flush();
+            for row in self.rows.iter_mut().chain([&mut self.alone]) {
+                row.clear(steps.len(), self.with_squares);
             }
             self.steps = steps;
         }
-        let (scale, with_squares) = (self.scale, self.with_squares);
+        let first = self.steps.start;
         let is_block = cells.len() == ROWS * ROWS;
         for (cell, weight) in cells.iter().enumerate() {
             if weight.weight == 0 {
                 continue;
             }
+            let own = values.steps(cell, self.steps.len());
+            self.totals.look_at(first, own);
             let row = &mut self.rows[if is_block { cell / ROWS } else { 0 }];
-            if row.weight != *weight || row.cell_count == MOST_CELLS {
-                row.flush(scale, with_squares, &mut self.out[self.steps.clone()])?;
-                row.weight = *weight;
+            let is_alone =
+                row.cell_count > 0 && row.weight != *weight && cells.get(cell + 1) != Some(weight);
+            let to = if is_alone { &mut self.alone } else { row };
+            if to.weight != *weight || to.cell_count == MOST_CELLS {
+                to.flush(first, &mut self.totals);
+                to.weight = *weight;
             }
-            row.add(values.steps(cell, self.steps.len()), scale, with_squares);
+            if to.add(own, self.steps_of) {
+                let beyond = own
+                    .iter()
+                    .find(|it| !it.is_nan() && !self.scale.holds(**it));
+                return Err(OutOfRange(beyond.copied().unwrap_or(f32::NAN).into()));
+            }
+            if is_alone {
+                to.flush(first, &mut self.totals);
+            }
         }
         Ok(())
     }
 
-    fn flush(&mut self) -> Result<(), OutOfRange> {
+    fn flush(&mut self) {
         for row in &mut self.rows {
-            row.flush(
-                self.scale,
-                self.with_squares,
-                &mut self.out[self.steps.clone()],
-            )?;
+            row.flush(self.steps.start, &mut self.totals);
         }
-        Ok(())
     }
 
     /// The sums of all steps.
-    ///
-    /// # Errors
-    /// A value beyond anything physical.
-    pub(super) fn finish(mut self) -> Result<Vec<StepSums>, OutOfRange> {
-        self.flush()?;
-        Ok(self.out)
+    pub(super) fn finish(mut self) -> Vec<StepSums> {
+        self.flush();
+        self.totals.finish()
     }
 }
 

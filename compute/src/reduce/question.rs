@@ -48,8 +48,9 @@ pub(super) struct Question {
 }
 
 impl Question {
-    /// What the sums of all steps of a run are remembered by, `run` being what names its values; none of what is no sum.
-    pub(super) fn sums_name(&self, run: &Digest) -> Option<Digest> {
+    /// What, beside the name of a run's values, the sums of all its steps are remembered by; none of what is no sum. Weights may be the
+    /// text of a long line, which is digested once and not for each run.
+    pub(super) fn sums_name(&self) -> Option<Digest> {
         let Wanted::Sums {
             with_squares,
             with_extremes,
@@ -59,7 +60,7 @@ impl Question {
         };
         let weights = (self.shape, &self.whole, &self.covered, self.unit);
         let wanted = (with_squares, with_extremes);
-        Some(Digest::of_json(&(run, weights, self.scale, wanted)))
+        Some(Digest::of_json(&(weights, self.scale, wanted)))
     }
 
     /// How values count in stored sums that it can be answered from, if it can be from any: they know no extremes.

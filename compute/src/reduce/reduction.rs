@@ -35,8 +35,12 @@ impl<'a> Reduction<'a> {
         let is_of_region = matches!(question.wanted, Wanted::RegionSums { .. });
         let steps = piece.steps.len();
         let sums = match question.wanted {
-            Wanted::Sums { with_squares, .. } => {
-                Some(Summing::new(steps, question.scale, with_squares))
+            Wanted::Sums {
+                with_squares,
+                with_extremes,
+            } => {
+                let wanted = [with_squares, with_extremes];
+                Some(Summing::new(steps, question.scale, wanted))
             }
             Wanted::Histograms { .. } | Wanted::RegionSums { .. } => None,
         };
@@ -86,33 +90,17 @@ impl<'a> Reduction<'a> {
         }
     }
 
-    pub(super) fn accumulated(mut self) -> Result<Accumulated, ComputeError> {
+    pub(super) fn accumulated(mut self) -> Accumulated {
         let first = self.piece.first_step + self.piece.steps.start;
         if let Some(sums) = self.sums {
-            let sums = sums.finish();
-            let sums = sums.map_err(|e| ComputeError::inconsistent(self.piece.key.as_str(), e))?;
-            let with_extremes = matches!(
-                self.question.wanted,
-                Wanted::Sums {
-                    with_extremes: true,
-                    ..
-                }
-            );
-            // Stored sums know none: those of the rest would be some of all.
-            let own = sums.into_iter().map(|own| {
-                if with_extremes {
-                    own
-                } else {
-                    own.without_extremes()
-                }
-            });
-            let own = (first..).zip(own);
+            // Without extremes unless they are wanted: stored sums know none, and those of the rest would be some of all.
+            let own = (first..).zip(sums.finish());
             self.all
                 .steps
                 .extend(own.filter(|(_, sums)| sums.count > 0));
         }
         self.all.regions.extend((first..).zip(self.regions));
-        Ok(self.all)
+        self.all
     }
 }
 

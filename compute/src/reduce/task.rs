@@ -11,7 +11,7 @@ use storage::rows::Stored;
 use storage::{StorageError, fields};
 
 use super::accumulator::Accumulated;
-use super::cells::{self, Cells, block};
+use super::cells::{self, Cells, block, block_window};
 use super::question::{Layout, Piece, Question, Wanted};
 use super::reduction::{CellShares, Reduction};
 use super::stored::{Stored as StoredSums, Terms};
@@ -241,7 +241,7 @@ impl Worker {
         terms: &Terms,
         records: &EncodedSums,
     ) -> Result<(Accumulated, BTreeSet<usize>), Undecoded> {
-        let windows = cells::blocks(self.question.shape);
+        let shape = self.question.shape;
         let with_squares = matches!(
             self.question.wanted,
             Wanted::Sums {
@@ -250,9 +250,9 @@ impl Worker {
             }
         );
         let mut stored = StoredSums::new(terms, records.pieces(), with_squares);
-        records.each(|term, record| {
+        records.each(with_squares, |term, record| {
             let weights = |number: u32| {
-                let window = windows[number as usize];
+                let window = block_window(shape, number);
                 block(self.cells().window(window), window)
             };
             stored.add(term, record, weights);
@@ -281,11 +281,11 @@ impl Worker {
         piece: &Piece,
         blocks: &EncodedBlocks,
     ) -> Result<Result<Accumulated, ComputeError>, Undecoded> {
-        let windows = cells::blocks(self.question.shape);
+        let shape = self.question.shape;
         let mut reduction = Reduction::of(&self.question, piece, self.seconds(piece));
         let mut failed = None;
         blocks.each(|number, values| {
-            let cells = self.cells_of(windows[piece.rows[number] as usize], true);
+            let cells = self.cells_of(block_window(shape, piece.rows[number]), true);
             let added = blocks.pieces().iter().try_for_each(|run| {
                 let run_values = Values {
                     of: values,
@@ -297,7 +297,7 @@ impl Worker {
             failed = added.err();
             failed.is_none()
         })?;
-        Ok(failed.map_or_else(|| reduction.accumulated(), Err))
+        Ok(failed.map_or_else(|| Ok(reduction.accumulated()), Err))
     }
 
     /// Reduces rows on a thread of its own; `each` hands them over, `windows` are where they lie.
@@ -331,7 +331,7 @@ impl Worker {
             };
             reduction.add(own, &cells, 0..steps.len())
         })?;
-        reduction.accumulated()
+        Ok(reduction.accumulated())
     }
 
     /// What values of a piece's steps are multiplied with besides areas.

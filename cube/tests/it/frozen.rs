@@ -156,7 +156,7 @@ async fn frozen_sums_are_those_of_their_values() {
     let blocks = [[0, 0], [0, 1], [1, 0], [1, 1]];
     let found = values.sums(&blocks, steps.clone()).await.unwrap().unwrap();
     let mut count = 0;
-    let sound = found.each(|number, record| {
+    let sound = found.each(true, |number, record| {
         let ([row, col], mut asked) = (blocks[number].map(|at| at * 8), 0);
         for step in steps.clone() {
             let (mut held, mut weight, mut sum, mut squares) = (0, 0, 0, 0);

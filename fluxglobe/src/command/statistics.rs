@@ -8,7 +8,9 @@ use comfy_table::{CellAlignment, Table};
 use compute::reduce::statistics;
 use compute::region::file;
 use contract::geometry::AskedGeometry;
+use contract::rows::Tabular as _;
 use contract::statistics::{StatisticsAnswer, StatisticsQuery, StatisticsRow, StatisticsWishes};
+use export::answer::AnswerFormat;
 
 use crate::cli::{PlotFile, Settings, StatisticsOptions, StatsLine};
 use crate::{deployment, plot, progress};
@@ -74,7 +76,7 @@ pub(crate) async fn run(
     }
     match form {
         Form::Json => return progress::result(&serde_json::to_string_pretty(&answer)?),
-        Form::Csv => progress::result(csv(&answer).trim_end())?,
+        Form::Csv => progress::result(csv(&answer)?.trim_end())?,
         Form::Table => progress::result(&table(&answer).to_string())?,
     }
     progress::say(&format!(
@@ -154,34 +156,8 @@ fn shown(row: &StatisticsRow, name: &str) -> String {
     }
 }
 
-/// A line a row; a value that is not there is empty.
-fn csv(answer: &StatisticsAnswer) -> String {
-    let names = || answer.statistics.iter().map(|one| one.name.as_str());
-    let mut header = vec!["start".to_owned(), "end".to_owned()];
-    for one in &answer.statistics {
-        header.push(one.name.clone());
-        if ["min", "max"].contains(&one.name.as_str()) {
-            header.push(format!("{}_found_at", one.name));
-        }
-    }
-    header.extend(["coverage_percent", "step_count", "is_withheld"].map(str::to_owned));
-    let mut lines = vec![header.join(",")];
-    for row in &answer.rows {
-        let mut cells = vec![row.start.to_string(), row.end.to_string()];
-        for name in names() {
-            let value = row.values.get(name).copied().flatten();
-            cells.push(value.map_or_else(String::new, |value| value.to_string()));
-            if ["min", "max"].contains(&name) {
-                let at = row.found_at.get(name);
-                cells.push(at.map_or_else(String::new, ToString::to_string));
-            }
-        }
-        cells.extend([
-            row.coverage_percent.to_string(),
-            row.step_count.to_string(),
-            row.is_withheld.to_string(),
-        ]);
-        lines.push(cells.join(","));
-    }
-    lines.join("\n") + "\n"
+/// A line a row; a value that is not there is empty. The same over HTTP.
+fn csv(answer: &StatisticsAnswer) -> Result<String> {
+    let content = export::answer::encoded(&answer.columns(), AnswerFormat::Csv)?;
+    Ok(String::from_utf8(content)?)
 }

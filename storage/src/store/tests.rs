@@ -74,3 +74,16 @@ async fn a_missing_object_is_told_from_a_broken_store() {
     let error = missing.unwrap_err();
     assert!(error.is_not_found() && !error.is_retryable());
 }
+
+#[tokio::test]
+async fn a_folder_tells_the_file_of_an_object_unless_a_layer_is_to_see_requests() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(folder.path().join("a b%20c#d").to_str().unwrap()).unwrap();
+    let key: ObjectKey = "cubes/p/chunks/0123".parse().unwrap();
+    store.put_new(&key, Bytes::from("x")).await.unwrap();
+    let file = store.file(&key).unwrap();
+    assert_eq!(std::fs::read(file).unwrap(), b"x");
+    assert!(store.through(|objects| objects).file(&key).is_none());
+    assert!(store.counted().0.file(&key).is_none());
+    assert!(Store::memory().file(&key).is_none());
+}

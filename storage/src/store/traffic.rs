@@ -104,6 +104,7 @@ impl Store {
             objects: layer(&self.objects),
             root: layer(&self.root),
             traffic: Some(Arc::clone(&traffic)),
+            is_layered: true,
             checked: Arc::default(),
             pages: Arc::default(),
             newest: Arc::default(),

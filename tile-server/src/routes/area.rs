@@ -1,12 +1,12 @@
 //! `/api/products/{product}/area`: the mean of a product over a region, step by step, with what it is a mean of; or other
 //! statistics of it.
 
-use axum::Json;
 use axum::extract::State;
-use axum::http::header;
-use axum::response::{IntoResponse as _, Response};
+use axum::http::HeaderMap;
+use axum::response::Response;
 use contract::earth::Earth;
 use contract::region::Cells;
+use contract::rows::RowsForm;
 use contract::series::RegionSeries;
 use contract::statistics::{RegionQuestion, StatisticsWishes};
 use contract::time::TimeStep;
@@ -16,7 +16,7 @@ use utoipa::IntoParams;
 use crate::error::ServerError;
 use crate::extract::{UrlPath, UrlQuery, parsed};
 use crate::routes::budget::ocean;
-use crate::routes::statistics::{SeriesOrStatistics, StatisticsText, answer};
+use crate::routes::statistics::{SeriesOrStatistics, StatisticsText, answer, form, response};
 use crate::state::AppState;
 
 #[derive(Debug, Deserialize, IntoParams)]
@@ -47,6 +47,9 @@ pub(crate) struct AreaParameters {
     /// How cells on the coast count in statistics; `whole` unless told otherwise.
     #[param(value_type = Option<Cells>)]
     cells: Option<String>,
+    /// Form of the answer: `json`, or its rows alone as `csv` or `arrow`, a file of Arrow; by the header `Accept` unless one is given.
+    #[param(value_type = Option<RowsForm>)]
+    format: Option<String>,
     /// Version, as answers name it; the newest unless one is given.
     manifest: Option<String>,
 }
@@ -61,14 +64,20 @@ pub(crate) struct AreaParameters {
     responses((
         status = 200,
         description = "One mean for each step; statistics where they are asked for",
-        body = inline(SeriesOrStatistics<RegionSeries>),
+        content(
+            (inline(SeriesOrStatistics<RegionSeries>) = "application/json"),
+            (String = "text/csv"),
+            (Vec<u8> = "application/vnd.apache.arrow.file"),
+        ),
     )),
 )]
 pub(crate) async fn get(
     State(state): State<AppState>,
+    headers: HeaderMap,
     UrlPath(product): UrlPath<String>,
     UrlQuery(asked): UrlQuery<AreaParameters>,
 ) -> Result<Response, ServerError> {
+    let form = form(asked.format.as_deref(), &headers)?;
     let named = asked.manifest.as_deref();
     let layer = state.catalogue.version(&product, named).await?;
     let Some(region) = asked.region.as_deref() else {
@@ -92,11 +101,11 @@ pub(crate) async fn get(
     };
     let product = layer.manifest.product.clone();
     let query = match wishes.over_region(product, region.parse()?) {
-        RegionQuestion::Statistics(query) => return answer(&state, &layer, query).await,
+        RegionQuestion::Statistics(query) => return answer(&state, &layer, query, form).await,
         RegionQuestion::Series(query) => query,
     };
     // What cannot be asked waits for no turn.
     layer.manifest.steps_inside(query.from, query.to)?;
-    let series = state.analyses.area(&layer, query).await?;
-    Ok(([(header::CACHE_CONTROL, "no-cache")], Json(&*series)).into_response())
+    let content = state.analyses.area(&layer, query, form).await?;
+    Ok(response(content, form))
 }

@@ -1,9 +1,11 @@
 //! `/api/products/{product}/line`: statistics of a product along a line, each cell by the length of the line in it.
 
 use axum::extract::State;
+use axum::http::HeaderMap;
 use axum::response::Response;
 use contract::earth::Earth;
 use contract::geometry::AskedGeometry;
+use contract::rows::RowsForm;
 use contract::statistics::StatisticsAnswer;
 use contract::time::TimeStep;
 use serde::Deserialize;
@@ -11,7 +13,7 @@ use utoipa::IntoParams;
 
 use crate::error::ServerError;
 use crate::extract::{UrlPath, UrlQuery};
-use crate::routes::statistics::{StatisticsText, answer};
+use crate::routes::statistics::{StatisticsText, answer, form};
 use crate::state::AppState;
 
 #[derive(Debug, Deserialize, IntoParams)]
@@ -37,6 +39,9 @@ pub(crate) struct LineParameters {
     /// Figure of the earth for lengths; `wgs84` unless one is given.
     #[param(value_type = Option<Earth>)]
     earth: Option<String>,
+    /// Form of the answer: `json`, or its rows alone as `csv` or `arrow`, a file of Arrow; by the header `Accept` unless one is given.
+    #[param(value_type = Option<RowsForm>)]
+    format: Option<String>,
     /// Version, as answers name it; the newest unless one is given.
     manifest: Option<String>,
 }
@@ -48,13 +53,23 @@ pub(crate) struct LineParameters {
     operation_id = "line",
     tag = "statistics",
     params(("product" = String, Path, description = "Name of the product"), LineParameters),
-    responses((status = 200, description = "One row for each bin of time", body = StatisticsAnswer)),
+    responses((
+        status = 200,
+        description = "One row for each bin of time",
+        content(
+            (StatisticsAnswer = "application/json"),
+            (String = "text/csv"),
+            (Vec<u8> = "application/vnd.apache.arrow.file"),
+        ),
+    )),
 )]
 pub(crate) async fn get(
     State(state): State<AppState>,
+    headers: HeaderMap,
     UrlPath(product): UrlPath<String>,
     UrlQuery(own): UrlQuery<LineParameters>,
 ) -> Result<Response, ServerError> {
+    let form = form(own.format.as_deref(), &headers)?;
     let layer = state
         .catalogue
         .version(&product, own.manifest.as_deref())
@@ -75,5 +90,5 @@ pub(crate) async fn get(
     };
     let product = layer.manifest.product.clone();
     let query = text.wishes()?.query(product, AskedGeometry::line(line)?);
-    answer(&state, &layer, query).await
+    answer(&state, &layer, query, form).await
 }

@@ -2,10 +2,11 @@
 //! statistics of it by bins of time.
 
 use axum::extract::State;
-use axum::http::header;
-use axum::response::{IntoResponse as _, Response};
+use axum::http::HeaderMap;
+use axum::response::Response;
 use contract::geometry::Sampling;
 use contract::grid::LonLatDeg;
+use contract::rows::RowsForm;
 use contract::series::PointSeries;
 use contract::statistics::{PointQuestion, StatisticsWishes};
 use contract::time::TimeStep;
@@ -14,7 +15,7 @@ use utoipa::IntoParams;
 
 use crate::error::ServerError;
 use crate::extract::{UrlPath, UrlQuery, number, parsed};
-use crate::routes::statistics::{SeriesOrStatistics, StatisticsText, answer};
+use crate::routes::statistics::{SeriesOrStatistics, StatisticsText, answer, form, response};
 use crate::state::AppState;
 
 #[derive(Debug, Deserialize, IntoParams)]
@@ -43,6 +44,9 @@ pub(crate) struct PointParameters {
     /// What the value at the place is: that of its cell, or bilinear of the four around it; `cell` unless told otherwise.
     #[param(value_type = Option<Sampling>)]
     sampling: Option<String>,
+    /// Form of the answer: `json`, or its rows alone as `csv` or `arrow`, a file of Arrow; by the header `Accept` unless one is given.
+    #[param(value_type = Option<RowsForm>)]
+    format: Option<String>,
     /// Version, as answers name it; the newest unless one is given.
     manifest: Option<String>,
 }
@@ -57,14 +61,20 @@ pub(crate) struct PointParameters {
     responses((
         status = 200,
         description = "One value for each step; statistics where they are asked for",
-        body = inline(SeriesOrStatistics<PointSeries>),
+        content(
+            (inline(SeriesOrStatistics<PointSeries>) = "application/json"),
+            (String = "text/csv"),
+            (Vec<u8> = "application/vnd.apache.arrow.file"),
+        ),
     )),
 )]
 pub(crate) async fn get(
     State(state): State<AppState>,
+    headers: HeaderMap,
     UrlPath(product): UrlPath<String>,
     UrlQuery(asked): UrlQuery<PointParameters>,
 ) -> Result<Response, ServerError> {
+    let form = form(asked.format.as_deref(), &headers)?;
     let named = asked.manifest.as_deref();
     let layer = state.catalogue.version(&product, named).await?;
     let coordinate = |name, text: &Option<String>, wanted| match text.as_deref() {
@@ -90,13 +100,9 @@ pub(crate) async fn get(
     };
     let product = layer.manifest.product.clone();
     let place = match wishes.at_point(product, place) {
-        PointQuestion::Statistics(query) => return answer(&state, &layer, query).await,
+        PointQuestion::Statistics(query) => return answer(&state, &layer, query, form).await,
         PointQuestion::Series(place) => place,
     };
-    let series = state.analyses.point(&layer, place).await?;
-    let headers = [
-        (header::CACHE_CONTROL, "no-cache"),
-        (header::CONTENT_TYPE, "application/json"),
-    ];
-    Ok((headers, series).into_response())
+    let content = state.analyses.point(&layer, place, form).await?;
+    Ok(response(content, form))
 }

@@ -1,8 +1,9 @@
 //! What `/point`, `/line` and `/area` of a product have in common where statistics are asked of them.
 
-use axum::Json;
-use axum::http::header;
+use axum::http::{HeaderMap, header};
 use axum::response::{IntoResponse as _, Response};
+use bytes::Bytes;
+use contract::rows::RowsForm;
 use contract::statistics::{StatisticsAnswer, StatisticsQuery, StatisticsWishes};
 use serde::Serialize;
 use utoipa::ToSchema;
@@ -56,11 +57,32 @@ pub(crate) async fn answer(
     state: &AppState,
     layer: &Layer,
     query: StatisticsQuery,
+    form: RowsForm,
 ) -> Result<Response, ServerError> {
     // What cannot be asked waits for no turn.
     let (window, inside) = layer.manifest.steps_inside(query.from, query.to)?;
     let periods = inside.iter().map(|step| step.period);
     query.step.bins(window, periods)?;
-    let answer = state.analyses.statistics(layer, query).await?;
-    Ok(([(header::CACHE_CONTROL, "no-cache")], Json(&*answer)).into_response())
+    let content = state.analyses.statistics(layer, query, form).await?;
+    Ok(response(content, form))
+}
+
+/// The form that is asked for by name or, where none is, by the header `Accept`.
+pub(crate) fn form(format: Option<&str>, headers: &HeaderMap) -> Result<RowsForm, ServerError> {
+    if let Some(form) = parsed(format)? {
+        return Ok(form);
+    }
+    let accept = headers.get(header::ACCEPT);
+    let accept = accept.and_then(|value| value.to_str().ok());
+    Ok(RowsForm::accepted(accept.unwrap_or_default()))
+}
+
+/// An answer in a form.
+pub(crate) fn response(content: Bytes, form: RowsForm) -> Response {
+    let headers = [
+        (header::CACHE_CONTROL, "no-cache"),
+        (header::CONTENT_TYPE, form.media_type()),
+        (header::VARY, "accept"),
+    ];
+    (headers, content).into_response()
 }

@@ -18,6 +18,7 @@ use contract::job::RenderJob;
 use contract::manifest::{Manifest, ManifestId, Step};
 use contract::observation::{Filter, Observation, Page, Platform, TrackPoint, TrackQuery};
 use contract::quantity::Quantity;
+use contract::rows::{Columns, RowsForm};
 use contract::series::{
     Cell, CellCounts, PointSeries, PointValue, RegionSeries, RegionSeriesQuery, RegionValue,
 };
@@ -224,6 +225,7 @@ pub(crate) struct Analyst {
     pub(crate) points: Mutex<Vec<LonLatDeg>>,
     pub(crate) areas: Mutex<Vec<RegionSeriesQuery>>,
     pub(crate) statistics: Mutex<Vec<StatisticsQuery>>,
+    pub(crate) encoded: Mutex<Vec<RowsForm>>,
     pub(crate) made: Mutex<Vec<SeriesQuestion>>,
     pub(crate) check: Mutex<Option<Check>>,
     pub(crate) mood: Mutex<Mood>,
@@ -445,6 +447,14 @@ impl Analyse for Analyst {
                 MadeOfSeries::Hovmoller(serde_json::from_value(hovmoller(version)).unwrap())
             }
         })
+    }
+
+    fn encoded(&self, columns: &Columns, form: RowsForm) -> Result<Vec<u8>, BackendError> {
+        self.mood().apply()?;
+        self.encoded.lock().unwrap().push(form);
+        let names = columns.columns.iter().map(|own| own.name.as_str());
+        let names: Vec<&str> = names.collect();
+        Ok(format!("{form} of {}", names.join(",")).into_bytes())
     }
 
     async fn check(&self) -> Result<Option<Check>, BackendError> {

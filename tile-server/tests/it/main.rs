@@ -16,6 +16,7 @@ mod doubles;
 mod events;
 mod faults;
 mod flow;
+mod forms;
 mod globe;
 mod health;
 mod hostile;

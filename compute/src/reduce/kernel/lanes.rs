@@ -1,0 +1,238 @@
+//! Loops over the steps of one cell: values in, whole numbers added to sums out. They are compiled for any processor and for those
+//! that take four numbers at a time (AVX2) or eight (AVX-512); all add the same integers.
+
+use cube::scale::{Scale, nearest};
+
+/// How values become steps of a scale, worked out once.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Steps {
+    zero: f64,
+    per_value: f64,
+    squares_per_step: f64,
+    /// Steps of the largest distance from the zero that can be summed.
+    most: f64,
+}
+
+impl Steps {
+    pub(super) fn of(scale: Scale) -> Self {
+        Self {
+            zero: scale.zero(),
+            per_value: scale.steps_per_value(),
+            squares_per_step: Scale::squares_per_step(),
+            most: Scale::most_steps(),
+        }
+    }
+
+    #[expect(
+        clippy::inline_always,
+        reason = "a part of loops that are compiled several times"
+    )]
+    #[inline(always)]
+    fn distance(self, value: f32) -> f64 {
+        (f64::from(value) - self.zero) * self.per_value
+    }
+}
+
+/// Sums by step, all of one length.
+pub(super) struct ByStep<'a> {
+    /// Values that are there.
+    pub(super) counts: &'a mut [i64],
+    /// They, in steps.
+    pub(super) steps: &'a mut [i64],
+    /// Their squares; nothing where they are not wanted.
+    pub(super) squares: &'a mut [i64],
+}
+
+/// Adds the values of a cell; is one among them that cannot be summed? Then the sums say nothing.
+pub(super) fn add(values: &[f32], steps: Steps, to: &mut ByStep<'_>) -> bool {
+    #[cfg(target_arch = "x86_64")]
+    #[expect(unsafe_code, reason = "the processor has what it is compiled for")]
+    match Lanes::of_this_processor() {
+        // SAFETY: the processor was asked.
+        Lanes::Eight => return unsafe { add_avx512(values, steps, to) },
+        // SAFETY: as above.
+        Lanes::Four => return unsafe { add_avx2(values, steps, to) },
+        Lanes::Any => {}
+    }
+    add_any(values, steps, to)
+}
+
+/// How many numbers a processor takes at a time.
+#[cfg(target_arch = "x86_64")]
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Lanes {
+    Any,
+    /// AVX2.
+    Four,
+    /// AVX-512 with products of 64 bits.
+    Eight,
+}
+
+#[cfg(target_arch = "x86_64")]
+impl Lanes {
+    /// The library asks the processor once.
+    fn of_this_processor() -> Self {
+        let is_eight = is_x86_feature_detected!("avx512f")
+            && is_x86_feature_detected!("avx512dq")
+            && is_x86_feature_detected!("avx512vl");
+        match (is_eight, is_x86_feature_detected!("avx2")) {
+            (true, _) => Self::Eight,
+            (false, true) => Self::Four,
+            (false, false) => Self::Any,
+        }
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f,avx512dq,avx512vl")]
+fn add_avx512(values: &[f32], steps: Steps, to: &mut ByStep<'_>) -> bool {
+    add_any(values, steps, to)
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn add_avx2(values: &[f32], steps: Steps, to: &mut ByStep<'_>) -> bool {
+    add_any(values, steps, to)
+}
+
+#[expect(clippy::inline_always, reason = "it is compiled several times")]
+#[inline(always)]
+fn add_any(values: &[f32], steps: Steps, to: &mut ByStep<'_>) -> bool {
+    let mut beyond = 0;
+    for ((count, sum), value) in to.counts.iter_mut().zip(&mut *to.steps).zip(values) {
+        let is_there = !value.is_nan();
+        let own = steps.distance(*value);
+        // Of what is beyond anything physical this is some number.
+        *sum = sum.wrapping_add(if is_there { nearest(own) } else { 0 });
+        *count += i64::from(is_there);
+        beyond |= i64::from(own.abs() > steps.most);
+    }
+    for (sum, value) in to.squares.iter_mut().zip(values) {
+        let own = steps.distance(*value);
+        let square = nearest(own * own * steps.squares_per_step);
+        *sum = sum.wrapping_add(if value.is_nan() { 0 } else { square });
+    }
+    beyond != 0
+}
+
+/// Sums by step times the weights of cells, all of one length.
+pub(super) struct Weighed<'a> {
+    pub(super) counts: &'a mut [i64],
+    pub(super) weights: &'a mut [i64],
+    pub(super) covered: &'a mut [i64],
+}
+
+/// Adds how many values there are times what each of them weighs, and what coverage counts of it.
+pub(super) fn add_counts(counts: &[i64], [weight, covered]: [i64; 2], to: &mut Weighed<'_>) {
+    #[cfg(target_arch = "x86_64")]
+    #[expect(unsafe_code, reason = "the processor has what it is compiled for")]
+    match Lanes::of_this_processor() {
+        // SAFETY: the processor was asked.
+        Lanes::Eight => return unsafe { add_counts_avx512(counts, [weight, covered], to) },
+        // SAFETY: as above.
+        Lanes::Four => return unsafe { add_counts_avx2(counts, [weight, covered], to) },
+        Lanes::Any => {}
+    }
+    add_counts_any(counts, [weight, covered], to);
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f,avx512dq,avx512vl")]
+fn add_counts_avx512(counts: &[i64], weights: [i64; 2], to: &mut Weighed<'_>) {
+    add_counts_any(counts, weights, to);
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn add_counts_avx2(counts: &[i64], weights: [i64; 2], to: &mut Weighed<'_>) {
+    add_counts_any(counts, weights, to);
+}
+
+#[expect(clippy::inline_always, reason = "it is compiled several times")]
+#[inline(always)]
+fn add_counts_any(counts: &[i64], [weight, covered]: [i64; 2], to: &mut Weighed<'_>) {
+    for (own, count) in to.counts.iter_mut().zip(counts) {
+        *own += count;
+    }
+    for (own, count) in to.weights.iter_mut().zip(counts) {
+        *own += count * weight;
+    }
+    for (own, count) in to.covered.iter_mut().zip(counts) {
+        *own += count * covered;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use contract::quantity::Quantity;
+
+    use super::*;
+
+    type Add = dyn Fn(&[f32], Steps, &mut ByStep<'_>) -> bool;
+
+    /// Those that this processor can run.
+    fn compilations() -> Vec<&'static Add> {
+        let mut all: Vec<&Add> = vec![&add, &add_any];
+        #[cfg(target_arch = "x86_64")]
+        if is_x86_feature_detected!("avx2") {
+            #[expect(unsafe_code, reason = "the processor was asked")]
+            // SAFETY: the line before.
+            all.push(&|values, steps, to| unsafe { add_avx2(values, steps, to) });
+        }
+        all
+    }
+
+    #[test]
+    fn all_compilations_add_the_same_integers() {
+        for quantity in [Quantity::CarbonFlux, Quantity::SeaSurfaceTemperature] {
+            let scale = Scale::of(quantity).unwrap();
+            let (low, high) = quantity.plausible().into_inner();
+            for count in [0, 1, 3, 4, 7, 128] {
+                let value = |at: usize| match at * 7919 % 11 {
+                    3 => f32::NAN,
+                    part => (low + (high - low) * part as f64 / 11.0) as f32,
+                };
+                let mut values: Vec<f32> = (0..count).map(value).collect();
+                let of = |add: &Add, values: &[f32]| {
+                    let mut all = [vec![3; count], vec![-5; count], vec![9; count]];
+                    let [counts, steps, squares] = &mut all;
+                    let mut to = ByStep {
+                        counts,
+                        steps,
+                        squares,
+                    };
+                    let is_beyond = add(values, Steps::of(scale), &mut to);
+                    (is_beyond, all)
+                };
+                let found = of(&add_any, &values);
+                for compiled in compilations() {
+                    assert_eq!(found, of(compiled, &values));
+                }
+                assert!(!found.0);
+                for (at, value) in values.iter().enumerate() {
+                    let is_there = !value.is_nan();
+                    let steps = if is_there { scale.steps(*value) } else { 0 };
+                    let square = if is_there {
+                        scale.square_steps(*value)
+                    } else {
+                        0
+                    };
+                    let own = found.1.each_ref().map(|own| own[at]);
+                    assert_eq!(own, [3 + i64::from(is_there), steps - 5, square + 9]);
+                }
+                for bad in [
+                    f32::INFINITY,
+                    f32::NEG_INFINITY,
+                    3.0 * high.abs().max(1.0) as f32 * 1e6,
+                ] {
+                    if let Some(last) = values.last_mut() {
+                        *last = bad;
+                        for compiled in compilations() {
+                            assert!(of(compiled, &values).0, "{bad}");
+                        }
+                    }
+                }
+            }
+        }
+    }
+}

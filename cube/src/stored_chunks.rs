@@ -1,0 +1,249 @@
+//! Chunks that lie in shards, as they are stored: where they are found, and their bytes, part by part.
+//!
+//! Of a folder nothing is read before somebody goes through them: then one thread reads part after part into one buffer, which takes
+//! less than a request each. Of other stores they are in memory.
+
+use std::fs::File;
+use std::io::{ErrorKind, Read as _, Seek as _, SeekFrom};
+use std::ops::Range;
+use std::path::PathBuf;
+
+use bytes::Bytes;
+
+use crate::values::Undecoded;
+
+pub(crate) const TOO_SHORT: &str = "its shard is shorter than its index says";
+
+/// A part of a shard, with chunks that lie near one another.
+#[derive(Debug)]
+pub(crate) struct Part {
+    pub(crate) source: Source,
+    pub(crate) chunks: Vec<InPart>,
+}
+
+/// Where the bytes of a part are.
+#[derive(Debug)]
+pub(crate) enum Source {
+    Held(Bytes),
+    File(PathBuf, Range<u64>),
+}
+
+impl Source {
+    /// Bytes of the part.
+    pub(crate) fn length(&self) -> usize {
+        match self {
+            Self::Held(content) => content.len(),
+            Self::File(_path, range) => (range.end - range.start) as usize,
+        }
+    }
+}
+
+/// A chunk in a part.
+#[derive(Debug, Clone)]
+pub(crate) struct InPart {
+    /// Its place among those asked for.
+    pub(crate) number: usize,
+    /// Its bytes in the part.
+    pub(crate) bytes: Range<usize>,
+}
+
+/// Chunks that were asked for; those that are not stored, since no cell has data, are in no part.
+#[derive(Debug, Default)]
+pub(crate) struct StoredChunks(pub(crate) Vec<Part>);
+
+/// The file that was read last.
+#[derive(Default)]
+struct Opened(Option<(PathBuf, File)>);
+
+impl Opened {
+    /// Reads a part of a file to the end of a buffer.
+    fn read(
+        &mut self,
+        path: &PathBuf,
+        range: &Range<u64>,
+        to: &mut Vec<u8>,
+    ) -> std::io::Result<()> {
+        let file = match &mut self.0 {
+            Some((own, file)) if own == path => file,
+            other => {
+                let opened = File::open(path)?;
+                &mut other.insert((path.clone(), opened)).1
+            }
+        };
+        file.seek(SeekFrom::Start(range.start))?;
+        let count = range.end - range.start;
+        let read = file.take(count).read_to_end(to)?;
+        if (read as u64) < count {
+            return Err(ErrorKind::UnexpectedEof.into());
+        }
+        Ok(())
+    }
+}
+
+fn unread(chunks: &[InPart], error: &std::io::Error) -> Undecoded {
+    let number = chunks.first().map_or(0, |chunk| chunk.number);
+    let reason = match error.kind() {
+        ErrorKind::UnexpectedEof => TOO_SHORT.to_owned(),
+        _ => error.to_string(),
+    };
+    Undecoded(number, reason)
+}
+
+impl StoredChunks {
+    /// Bytes of all chunks.
+    pub(crate) fn stored_bytes(&self) -> usize {
+        let chunks = self.0.iter().flat_map(|part| &part.chunks);
+        chunks.map(|chunk| chunk.bytes.len()).sum()
+    }
+
+    /// Hands over each chunk with its number, as they lie in their shards. `take` says whether to go on.
+    ///
+    /// # Errors
+    /// A part that cannot be read; what `take` says of a chunk.
+    pub(crate) fn each(
+        &self,
+        mut take: impl FnMut(usize, &[u8]) -> Result<bool, Undecoded>,
+    ) -> Result<(), Undecoded> {
+        let (mut opened, mut buffer) = (Opened::default(), vec![]);
+        for Part { source, chunks } in &self.0 {
+            let content: &[u8] = match source {
+                Source::Held(content) => content,
+                Source::File(path, range) => {
+                    buffer.clear();
+                    let read = opened.read(path, range, &mut buffer);
+                    read.map_err(|error| unread(chunks, &error))?;
+                    &buffer
+                }
+            };
+            for InPart { number, bytes } in chunks {
+                if !take(*number, &content[bytes.clone()])? {
+                    return Ok(());
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The same in the order of their numbers; all are held at once.
+    ///
+    /// # Errors
+    /// As [`Self::each`].
+    pub(crate) fn in_order(
+        &self,
+        mut take: impl FnMut(usize, &[u8]) -> Result<bool, Undecoded>,
+    ) -> Result<(), Undecoded> {
+        let (mut opened, mut buffer, mut places) = (Opened::default(), vec![], vec![]);
+        for Part { source, chunks } in &self.0 {
+            let start = buffer.len();
+            match source {
+                Source::Held(content) => buffer.extend_from_slice(content),
+                Source::File(path, range) => {
+                    let read = opened.read(path, range, &mut buffer);
+                    read.map_err(|error| unread(chunks, &error))?;
+                }
+            }
+            let moved = |chunk: &InPart| {
+                (
+                    chunk.number,
+                    start + chunk.bytes.start..start + chunk.bytes.end,
+                )
+            };
+            places.extend(chunks.iter().map(moved));
+        }
+        places.sort_unstable_by_key(|(number, _bytes)| *number);
+        for (number, bytes) in places {
+            if !take(number, &buffer[bytes])? {
+                return Ok(());
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn part(source: Source, chunks: &[(usize, Range<usize>)]) -> Part {
+        let chunk = |(number, bytes): &(usize, Range<usize>)| InPart {
+            number: *number,
+            bytes: bytes.clone(),
+        };
+        Part {
+            source,
+            chunks: chunks.iter().map(chunk).collect(),
+        }
+    }
+
+    fn gone_through(
+        chunks: &StoredChunks,
+        is_in_order: bool,
+    ) -> Result<Vec<(usize, Vec<u8>)>, Undecoded> {
+        let mut found = vec![];
+        let take = |number: usize, bytes: &[u8]| {
+            found.push((number, bytes.to_vec()));
+            Ok(true)
+        };
+        if is_in_order {
+            chunks.in_order(take)?;
+        } else {
+            chunks.each(take)?;
+        }
+        Ok(found)
+    }
+
+    #[test]
+    fn chunks_of_files_are_those_of_memory() {
+        let folder = tempfile::tempdir().unwrap();
+        let (one, other) = (folder.path().join("one"), folder.path().join("other"));
+        std::fs::write(&one, b"abcdefgh").unwrap();
+        std::fs::write(&other, b"ijklmnop").unwrap();
+        let parts = |source: &dyn Fn(&PathBuf, Range<u64>) -> Source| {
+            StoredChunks(vec![
+                part(source(&one, 2..6), &[(4, 0..2), (1, 3..4)]),
+                part(source(&other, 0..3), &[(0, 1..3)]),
+                part(source(&one, 0..1), &[(7, 0..1)]),
+            ])
+        };
+        let held = parts(&|path, range| {
+            let content = Bytes::from(std::fs::read(path).unwrap());
+            Source::Held(content.slice(range.start as usize..range.end as usize))
+        });
+        let files = parts(&|path, range| Source::File(path.clone(), range));
+        let text = |found: Vec<(usize, Vec<u8>)>| {
+            let each = found
+                .into_iter()
+                .map(|(number, bytes)| format!("{number}{}", String::from_utf8(bytes).unwrap()));
+            each.collect::<Vec<String>>().join(" ")
+        };
+        for chunks in [&held, &files] {
+            assert_eq!(text(gone_through(chunks, false).unwrap()), "4cd 1f 0jk 7a");
+            assert_eq!(text(gone_through(chunks, true).unwrap()), "0jk 1f 4cd 7a");
+            assert_eq!(chunks.stored_bytes(), 6);
+        }
+        let mut count = 0;
+        let stopped = files.each(|_number, _bytes| {
+            count += 1;
+            Ok(count < 2)
+        });
+        assert!(stopped.is_ok() && count == 2);
+    }
+
+    #[test]
+    fn a_file_that_is_gone_or_cut_off_is_an_error_of_its_chunk() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("shard");
+        std::fs::write(&path, b"abcd").unwrap();
+        let chunks = StoredChunks(vec![
+            part(Source::File(path.clone(), 0..2), &[(3, 0..2)]),
+            part(Source::File(path.clone(), 2..5), &[(9, 0..3)]),
+        ]);
+        for is_in_order in [true, false] {
+            let Undecoded(number, reason) = gone_through(&chunks, is_in_order).unwrap_err();
+            assert_eq!((number, reason.as_str()), (9, TOO_SHORT));
+        }
+        std::fs::remove_file(path).unwrap();
+        let Undecoded(number, reason) = gone_through(&chunks, false).unwrap_err();
+        assert!(number == 3 && reason.contains("No such file"), "{reason}");
+    }
+}
