@@ -18,6 +18,7 @@ mod encoded_sums;
 mod error;
 mod field;
 mod follow;
+pub mod foreign;
 mod keys;
 mod layer;
 mod layout;

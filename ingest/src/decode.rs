@@ -1,4 +1,4 @@
-//! [`PlannedGranule`] in, one [`DecodedGrid`] a step out: values on the stored grid, in the stored unit.
+//! [`Plan`] in, one [`DecodedGrid`] a step out: values on the stored grid, in the stored unit.
 
 use contract::masked::MaskedCells;
 use contract::quantity::Quantity;
@@ -6,12 +6,12 @@ use contract::time::Period;
 
 use crate::error::Stop;
 use crate::inspect::file::description::Part;
-use crate::inspect::reader::session::Session;
+use crate::inspect::values::Values;
 use crate::plan::cf::axis::Mapping;
 use crate::plan::cf::coordinate::{Axis, Role};
-use crate::plan::cf::packing::Unpacked;
+use crate::plan::cf::packing::{Packing, Unpacked};
 use crate::plan::cf::unmarked;
-use crate::plan::{PlannedGranule, PlannedStep};
+use crate::plan::{Plan, PlannedStep};
 
 /// One step as values, `[row, col]`, row 0 north, stored unit, NaN for no data.
 #[derive(Debug, Clone, PartialEq)]
@@ -23,43 +23,61 @@ pub(crate) struct DecodedGrid {
 }
 
 /// Reads and turns one step.
-pub(crate) async fn run(
-    granule: &mut PlannedGranule,
-    step: PlannedStep,
-) -> Result<DecodedGrid, Stop> {
-    let is_good = is_good(granule, step).await?;
-    let (session, axes) = (&mut granule.session, &granule.axes);
-    let mut stored = plane(session, &granule.variable.name, axes, step).await?;
+pub(crate) async fn run(plan: &mut Plan, step: PlannedStep) -> Result<DecodedGrid, Stop> {
+    let is_good = is_good(plan, step).await?;
+    let (values, axes) = (&mut plan.values, &plan.axes);
+    let mut stored = plane(values, &plan.variable.name, axes, step).await?;
     let mut masked = MaskedCells::default();
     let cells = stored.iter_mut().zip(is_good.iter().flatten());
     for (stored, _) in cells.filter(|(_, is_good)| !**is_good) {
-        let is_value = matches!(granule.packing.unpacked(*stored), Unpacked::Value(_));
+        let is_value = matches!(plan.packing.unpacked(*stored), Unpacked::Value(_));
         masked.poor_quality += u64::from(is_value);
         *stored = f64::NAN;
     }
-    if matches!(granule.target.quantity, Quantity::Open(_)) && granule.recipe.profile.is_none() {
-        let said = |stored: &f64| match granule.packing.unpacked(*stored) {
+    if matches!(plan.target.quantity, Quantity::Open(_)) && plan.recipe.profile.is_none() {
+        let said = |stored: &f64| match plan.packing.unpacked(*stored) {
             Unpacked::Value(_) => *stored,
             Unpacked::Missing | Unpacked::OutOfRange => f64::NAN,
         };
         let said: Vec<f64> = stored.iter().map(said).collect();
-        unmarked::check(&granule.variable.name, &said)?;
+        unmarked::check(&plan.variable.name, &said)?;
     }
-    let is_lat_first = granule.axes.iter().position(|a| a.role == Role::Latitude)
-        < granule.axes.iter().position(|a| a.role == Role::Longitude);
+    let values = converted(
+        (axes, &plan.mapping),
+        &plan.packing,
+        step,
+        &stored,
+        &mut masked,
+    );
+    Ok(DecodedGrid {
+        period: step.period,
+        values,
+        masked,
+    })
+}
+
+/// Values on the stored grid, in the stored unit, of a map as it lies in a file.
+///
+/// - `stored`: stored numbers of all latitudes and longitudes, in the order of `axes`
+/// - result: `[row, col]`, NaN no data; what is out of the valid range is counted in `masked`
+pub(crate) fn converted(
+    (axes, mapping): (&[Axis], &Mapping),
+    packing: &Packing,
+    step: PlannedStep,
+    stored: &[f64],
+    masked: &mut MaskedCells,
+) -> Vec<f32> {
+    let place = |role| axes.iter().position(|a| a.role == role);
+    let is_lat_first = place(Role::Latitude) < place(Role::Longitude);
     let len_of = |role| {
-        granule
-            .axes
-            .iter()
-            .find(|a| a.role == role)
-            .map_or(0, |a| a.len as usize)
+        let axis = axes.iter().find(|a| a.role == role);
+        axis.map_or(0, |a| a.len as usize)
     };
     let strides = if is_lat_first {
         [len_of(Role::Longitude), 1]
     } else {
         [1, len_of(Role::Latitude)]
     };
-    let packing = &granule.packing;
     // One rounding to float32, at the end.
     let convert = |stored: f64| {
         let value = match packing.unpacked(stored) {
@@ -72,45 +90,37 @@ pub(crate) async fn run(
         };
         (value * step.factor + step.offset) as f32
     };
-    let values = turned(&granule.mapping, strides, &stored, convert);
-    Ok(DecodedGrid {
-        period: step.period,
-        values,
-        masked,
-    })
+    turned(mapping, strides, stored, convert)
 }
 
 /// One map of a variable as stored, in the order of the file.
 async fn plane(
-    session: &mut Session,
+    values: &mut Values,
     variable: &str,
     axes: &[Axis],
     step: PlannedStep,
 ) -> Result<Vec<f64>, Stop> {
     let part: Vec<Part> = axes.iter().map(|axis| part(axis, step)).collect();
     let expected = axes.iter().filter(|a| is_plane(a)).map(|a| a.len).product();
-    session.read(variable, &part, expected).await
+    values.read(variable, &part, expected).await
 }
 
 /// Is every cell of the file's map good enough? None if nobody asks.
-async fn is_good(
-    granule: &mut PlannedGranule,
-    step: PlannedStep,
-) -> Result<Option<Vec<bool>>, Stop> {
-    let Some(quality) = &granule.quality else {
+async fn is_good(plan: &mut Plan, step: PlannedStep) -> Result<Option<Vec<bool>>, Stop> {
+    let Some(quality) = &plan.quality else {
         return Ok(None);
     };
-    let stored = plane(&mut granule.session, &quality.variable, &quality.axes, step).await?;
+    let stored = plane(&mut plan.values, &quality.variable, &quality.axes, step).await?;
     Ok(Some(
         stored.into_iter().map(|n| quality.accepts(n)).collect(),
     ))
 }
 
-fn is_plane(axis: &Axis) -> bool {
+pub(crate) fn is_plane(axis: &Axis) -> bool {
     matches!(axis.role, Role::Latitude | Role::Longitude)
 }
 
-fn part(axis: &Axis, step: PlannedStep) -> Part {
+pub(crate) fn part(axis: &Axis, step: PlannedStep) -> Part {
     match axis.role {
         Role::Latitude | Role::Longitude => Part::All,
         Role::Time => Part::At(step.time_index),

@@ -71,6 +71,8 @@ pub struct Store {
     pub(crate) pages: Arc<HeldPages>,
     /// The newest numbers of manifests that were seen.
     pub(crate) newest: Arc<Newest>,
+    /// The same store without the fields of attached products, if it has them.
+    pub(crate) bare: Option<Box<Self>>,
 }
 
 /// What kind of store it is, where that matters.
@@ -137,6 +139,7 @@ impl Store {
             traffic: None,
             pages: Arc::default(),
             newest: Arc::default(),
+            bare: None,
         }
     }
 
@@ -159,6 +162,7 @@ impl Store {
             traffic: None,
             pages: Arc::default(),
             newest: Arc::default(),
+            bare: None,
         })
     }
 
@@ -181,6 +185,7 @@ impl Store {
             traffic: None,
             pages: Arc::default(),
             newest: Arc::default(),
+            bare: None,
         })
     }
 
@@ -210,6 +215,15 @@ impl Store {
             objects: layer(Arc::clone(&self.objects)),
             root: layer(Arc::clone(&self.root)),
             ..self.clone()
+        }
+    }
+
+    /// The same store, which lies over a bare one.
+    #[must_use]
+    pub(crate) fn over(self, bare: Box<Self>) -> Self {
+        Self {
+            bare: Some(bare),
+            ..self
         }
     }
 

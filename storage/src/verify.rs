@@ -176,6 +176,10 @@ async fn check(store: &Store, key: &ObjectKey) -> Result<Checked, StorageError> 
         Ok(content) => content,
         Err(e) if e.is_not_found() => return Ok(Checked::Gone),
         Err(StorageError::Damaged { reason, .. }) => return Ok(Checked::Damaged(reason)),
+        // Of an attached product, and not what was attached any more.
+        Err(e) if !e.is_retryable() && e.attached().is_some() => {
+            return Ok(Checked::Damaged(e.to_string()));
+        }
         Err(e) => return Err(e),
     };
     let (own, bytes) = (key.clone(), content.len() as u64);

@@ -10,7 +10,7 @@ use contract::grid::Grid;
 use crate::commit::FIELDS_AT_ONCE;
 use crate::inspect::file::description::Description;
 use crate::observation::{MAX_OBSERVATIONS, MAX_VALUES, OBSERVATION_BYTES};
-use crate::plan::PlannedGranule;
+use crate::plan::{Plan, PlannedGranule};
 
 /// Bytes of a cell while its map is worked on. At most at once: 8 as the reader has it and 8 as it comes here; 8 as it
 /// came and 4 as it is stored; 4 as it is stored, up to 12 in a list that grows, 4 and 4 in pages and in the object.
@@ -31,18 +31,18 @@ const TEXT_BYTES_PER_OBSERVATION: u64 = 4;
 
 /// Maps of a file that are worked on at a time: as many as processors have something to do with, while the next is read, and
 /// one of what is large.
-pub(crate) fn grids_at_once(planned: &PlannedGranule) -> usize {
+pub(crate) fn grids_at_once(plan: &Plan) -> usize {
     let processors = std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
-    let map = planned.plane_cells().saturating_mul(CELL_BYTES).max(1);
-    let most = planned.steps.len().min(processors + MAPS_WAITING);
+    let map = plan.plane_cells().saturating_mul(CELL_BYTES).max(1);
+    let most = plan.steps.len().min(processors + MAPS_WAITING);
     ((MAPS_BYTES / map) as usize).clamp(1, most.max(1))
 }
 
 /// A file of maps: a few at a time, whatever their number.
 pub(crate) fn of_grids(planned: &PlannedGranule) -> u64 {
-    let map = planned.plane_cells().saturating_mul(CELL_BYTES);
-    let map = map.saturating_mul(grids_at_once(planned) as u64);
-    let reading = map.saturating_add(planned.session.library_bytes());
+    let map = planned.plan.plane_cells().saturating_mul(CELL_BYTES);
+    let map = map.saturating_mul(grids_at_once(&planned.plan) as u64);
+    let reading = map.saturating_add(planned.plan.values.library_bytes());
     reading.max(planned.raw.size_bytes.saturating_mul(RAW_COPIES))
 }
 
