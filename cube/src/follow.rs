@@ -72,9 +72,24 @@ pub fn follow<'a>(
 /// Versions are what is true, and a cube is made from them: one that cannot follow is said in the log and left behind, and
 /// is no reason to fail a landing. The next version brings it up, and so does `fluxglobe recompute --verify`.
 ///
+/// A product that is attached to a store of others ([`storage::attached`]) has no cube.
+///
 /// Complete runs of steps are then made time-major, which nobody waits for but [`crate::compacted`].
 pub fn keep_up<'a>(store: &'a Store, manifest: &'a Manifest) -> BoxFuture<'a, ()> {
     Box::pin(async move {
+        match store.attached_to(manifest).await {
+            // A cube is a copy of values, and these are not to be copied.
+            Ok(Some(attachment)) => {
+                let (version, place) = (manifest.id(), attachment.place());
+                tracing::debug!(%version, place, "an attached product has no cube");
+                return;
+            }
+            Ok(None) => {}
+            Err(error) => {
+                tracing::warn!(version = %manifest.id(), %error, "the cube stays behind");
+                return;
+            }
+        }
         let (own, version) = (store.clone(), manifest.clone());
         // A task of its own: a panic over a damaged cube ends there.
         let followed = tokio::spawn(async move { follow(&own, &version).await });

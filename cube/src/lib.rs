@@ -21,6 +21,7 @@ mod error;
 mod field;
 mod field_bands;
 mod follow;
+pub mod foreign;
 mod joined;
 mod joining;
 mod keys;

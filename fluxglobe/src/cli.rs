@@ -2,6 +2,7 @@
 
 mod analysis;
 mod annotations;
+mod attach;
 mod budget;
 mod derive;
 mod derived;
@@ -34,6 +35,7 @@ pub(crate) use analysis::{
     Place, PlotFile, PlotForm, StatsCorrelate, StatsDifference, StatsHovmoller,
 };
 pub(crate) use annotations::Annotated;
+pub(crate) use attach::Attach;
 pub(crate) use budget::Budget;
 pub(crate) use derive::{Derive, DeriveCo2Flux, DeriveWhat, Expression, Regrid};
 pub(crate) use derived::DeriveStatistic;
@@ -156,6 +158,8 @@ pub(crate) enum Command {
     Demo(Demo),
     /// Land files in a product.
     Ingest(Ingest),
+    /// Make a Zarr or Icechunk store of others a product without copying its values.
+    Attach(Attach),
     /// List what has landed.
     Products(Products),
     /// Write a product as a cube that xarray and other programs open: Zarr, or an Icechunk repository.

@@ -24,11 +24,16 @@ const REMOTE_PARTS: NonZeroUsize = NonZeroUsize::new(16).expect("it is not 0");
 /// Opens the object store that settings name, else the one in the data folder.
 pub(crate) fn store(settings: &Settings) -> Result<Store> {
     if let Some(url) = &settings.store {
-        return Ok(Store::open(url)?);
+        return Ok(with_attached(&Store::open(url)?));
     }
     let folder = settings.data.join("objects");
     let text = folder.to_str().context("--data is not UTF-8")?;
-    Ok(Store::open(text)?)
+    Ok(with_attached(&Store::open(text)?))
+}
+
+/// The same store, in which fields of attached products are read from where they lie.
+pub(crate) fn with_attached(store: &Store) -> Store {
+    store.with_attached(Arc::new(ingest::attach::ForeignFields::default()))
 }
 
 /// The same for those whom people wait for: that it is away is told of within seconds.
@@ -43,7 +48,7 @@ pub(crate) fn interactive_store(settings: &Settings) -> Result<Store> {
 pub(crate) fn open_interactive(url: &str) -> Result<Store, storage::StorageError> {
     let mut settings = storage::store::Settings::from_environment();
     settings.retry_limits = storage::store::RetryLimits::interactive();
-    Store::open_with(url, &settings)
+    Ok(with_attached(&Store::open_with(url, &settings)?))
 }
 
 /// Folder of the event log in the data folder.

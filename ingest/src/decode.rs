@@ -1,4 +1,4 @@
-//! [`PlannedGranule`] in, the bands of each step out: values of some rows on the stored grid, in the stored unit.
+//! [`Plan`] in, the bands of each step out: values of some rows on the stored grid, in the stored unit.
 
 use std::ops::Range;
 
@@ -7,12 +7,12 @@ use contract::quantity::Quantity;
 
 use crate::error::Stop;
 use crate::inspect::file::description::Part;
-use crate::inspect::reader::session::Session;
+use crate::inspect::values::Values;
 use crate::plan::cf::axis::Mapping;
 use crate::plan::cf::coordinate::{Axis, Role};
-use crate::plan::cf::packing::Unpacked;
+use crate::plan::cf::packing::{Packing, Unpacked};
 use crate::plan::cf::unmarked::Ends;
-use crate::plan::{PlannedGranule, PlannedStep};
+use crate::plan::{Plan, PlannedStep};
 
 /// Some rows of one step as values, `[row, col]`, from the north, stored unit, NaN for no data.
 #[derive(Debug, Clone, PartialEq)]
@@ -34,31 +34,53 @@ fn file_rows(mapping: &Mapping, rows: &Range<u32>) -> (u64, u64) {
 
 /// Reads and turns some rows of one step.
 pub(crate) async fn run(
-    granule: &mut PlannedGranule,
+    plan: &mut Plan,
     step: PlannedStep,
     rows: Range<u32>,
 ) -> Result<DecodedBand, Stop> {
-    let (first, count) = file_rows(&granule.mapping, &rows);
-    let slab = Slab { step, first, count };
-    let is_good = is_good(granule, slab).await?;
-    let (session, axes) = (&mut granule.session, &granule.axes);
-    let mut stored = slab.read(session, &granule.variable.name, axes).await?;
+    let slab = Slab::of(&plan.mapping, step, &rows);
+    let is_good = is_good(plan, slab).await?;
+    let axes = &plan.axes;
+    let mut stored = slab
+        .read(&mut plan.values, &plan.variable.name, axes)
+        .await?;
     let mut masked = MaskedCells::default();
     let cells = stored.iter_mut().zip(is_good.iter().flatten());
     for (stored, _) in cells.filter(|(_, is_good)| !**is_good) {
-        let is_value = matches!(granule.packing.unpacked(*stored), Unpacked::Value(_));
+        let is_value = matches!(plan.packing.unpacked(*stored), Unpacked::Value(_));
         masked.poor_quality += u64::from(is_value);
         *stored = f64::NAN;
     }
-    let packing = &granule.packing;
+    let packing = &plan.packing;
     let mut ends = Ends::default();
-    if matches!(granule.target.quantity, Quantity::Open(_)) && granule.recipe.profile.is_none() {
+    if matches!(plan.target.quantity, Quantity::Open(_)) && plan.recipe.profile.is_none() {
         let is_value = |stored: &&f64| matches!(packing.unpacked(**stored), Unpacked::Value(_));
         stored.iter().filter(is_value).for_each(|v| ends.add(*v));
     }
-    let place = |role| granule.axes.iter().position(|a| a.role == role);
-    let len_of = |role| place(role).map_or(0, |at| granule.axes[at].len as usize);
+    let lies = (axes.as_slice(), &plan.mapping);
+    let values = converted(lies, packing, (step, rows), &stored, &mut masked);
+    Ok(DecodedBand {
+        values,
+        masked,
+        ends,
+    })
+}
+
+/// Values of some rows on the stored grid, in the stored unit, from a part of a map as it lies in a file.
+///
+/// - `stored`: stored numbers of the latitudes of the file that hold the rows, and of all longitudes, in the order of `axes`
+/// - result: `[row, col]`, NaN no data; what is out of the valid range is counted in `masked`
+pub(crate) fn converted(
+    (axes, mapping): (&[Axis], &Mapping),
+    packing: &Packing,
+    (step, rows): (PlannedStep, Range<u32>),
+    stored: &[f64],
+    masked: &mut MaskedCells,
+) -> Vec<f32> {
+    let place = |role| axes.iter().position(|a| a.role == role);
+    let len_of = |role| place(role).map_or(0, |at| axes[at].len as usize);
     let is_lat_first = place(Role::Latitude) < place(Role::Longitude);
+    let (_, count) = file_rows(mapping, &rows);
     let strides = if is_lat_first {
         [len_of(Role::Longitude), 1]
     } else {
@@ -76,27 +98,28 @@ pub(crate) async fn run(
         };
         (value * step.factor + step.offset) as f32
     };
-    let values = turned(&granule.mapping, rows, strides, &stored, convert);
-    Ok(DecodedBand {
-        values,
-        masked,
-        ends,
-    })
+    turned(mapping, rows, strides, stored, convert)
 }
 
 /// Some latitudes of one map, as they lie in the file.
 #[derive(Debug, Clone, Copy)]
-struct Slab {
+pub(crate) struct Slab {
     step: PlannedStep,
     first: u64,
     count: u64,
 }
 
 impl Slab {
+    /// What holds some rows of the grid.
+    pub(crate) fn of(mapping: &Mapping, step: PlannedStep, rows: &Range<u32>) -> Self {
+        let (first, count) = file_rows(mapping, rows);
+        Self { step, first, count }
+    }
+
     /// Its values of a variable as stored, in the order of the file.
     async fn read(
         self,
-        session: &mut Session,
+        values: &mut Values,
         variable: &str,
         axes: &[Axis],
     ) -> Result<Vec<f64>, Stop> {
@@ -106,10 +129,11 @@ impl Slab {
             Role::Longitude => axis.len,
             Role::Time | Role::Other => 1,
         });
-        session.read(variable, &part, lens.product()).await
+        values.read(variable, &part, lens.product()).await
     }
 
-    fn part(self, axis: &Axis) -> Part {
+    /// What of an axis it is.
+    pub(crate) fn part(self, axis: &Axis) -> Part {
         let Self { first, count, .. } = self;
         match axis.role {
             Role::Latitude => Part::Some { first, count },
@@ -120,13 +144,17 @@ impl Slab {
     }
 }
 
+pub(crate) fn is_plane(axis: &Axis) -> bool {
+    matches!(axis.role, Role::Latitude | Role::Longitude)
+}
+
 /// Is every cell of a part of the file's map good enough? None if nobody asks.
-async fn is_good(granule: &mut PlannedGranule, slab: Slab) -> Result<Option<Vec<bool>>, Stop> {
-    let Some(quality) = &granule.quality else {
+async fn is_good(plan: &mut Plan, slab: Slab) -> Result<Option<Vec<bool>>, Stop> {
+    let Some(quality) = &plan.quality else {
         return Ok(None);
     };
-    let session = &mut granule.session;
-    let stored = slab.read(session, &quality.variable, &quality.axes).await?;
+    let (variable, axes) = (&quality.variable, &quality.axes);
+    let stored = slab.read(&mut plan.values, variable, axes).await?;
     Ok(Some(
         stored.into_iter().map(|n| quality.accepts(n)).collect(),
     ))

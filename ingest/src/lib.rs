@@ -14,6 +14,7 @@
 //! Files are parsed in a process of their own ([`reader`]); all else here sees only checked descriptions and numbers.
 //! Left out on purpose: swaths and irregular grids (refused).
 
+pub mod attach;
 mod check;
 mod commit;
 mod decode;

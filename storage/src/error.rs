@@ -2,6 +2,8 @@
 
 use contract::key::ObjectKey;
 
+use crate::failure::Failure;
+
 /// A failed read or write of something durable.
 #[derive(Debug, thiserror::Error)]
 pub enum StorageError {
@@ -56,6 +58,17 @@ impl StorageError {
         )
     }
 
+    /// Why a field of an attached product could not be read, if that is what failed.
+    pub fn attached(&self) -> Option<&Failure> {
+        match self {
+            Self::Object {
+                source: object_store::Error::Generic { source, .. },
+                ..
+            } => source.downcast_ref(),
+            _ => None,
+        }
+    }
+
     /// A failure of an event log that may pass.
     pub fn log(
         log: impl Into<String>,
@@ -100,6 +113,9 @@ fn is_final(cause: &(dyn std::error::Error + 'static)) -> bool {
     use std::io::ErrorKind;
     // Requests that were too slow, too many, or in each other's way.
     const PASSING: [&str; 3] = ["408", "409", "429"];
+    if let Some(failure) = cause.downcast_ref::<Failure>() {
+        return !failure.is_retryable;
+    }
     let text = cause.to_string();
     if let Some((_, status)) = text.split_once("status code: ")
         && status.starts_with('4')

@@ -4,11 +4,13 @@
 //! Every service reads and writes through this crate, so that a layout has one writer and one reader. Left out on
 //! purpose: what the values mean (contract) and what is done with them (the services).
 
+pub mod attached;
 pub mod content;
 pub mod contributed;
 pub mod document;
 pub mod domain;
 pub mod error;
+mod failure;
 pub mod fields;
 pub mod gc;
 pub mod log;

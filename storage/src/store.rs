@@ -27,6 +27,7 @@ use std::path::{Path as FilePath, PathBuf};
 use std::sync::Arc;
 
 use contract::key::ObjectKey;
+use contract::kind::Kind;
 use object_store::ObjectStore;
 use object_store::local::LocalFileSystem;
 use object_store::memory::InMemory;
@@ -76,6 +77,8 @@ pub struct Store {
     pub(crate) pages: Arc<HeldPages>,
     /// The newest numbers of manifests that were seen.
     pub(crate) newest: Arc<Newest>,
+    /// The same store without the fields of attached products, if it has them.
+    pub(crate) bare: Option<Box<Self>>,
 }
 
 /// What kind of store it is, where that matters.
@@ -143,6 +146,7 @@ impl Store {
             is_layered: false,
             pages: Arc::default(),
             newest: Arc::default(),
+            bare: None,
         }
     }
 
@@ -166,6 +170,7 @@ impl Store {
             is_layered: false,
             pages: Arc::default(),
             newest: Arc::default(),
+            bare: None,
         })
     }
 
@@ -189,6 +194,7 @@ impl Store {
             is_layered: false,
             pages: Arc::default(),
             newest: Arc::default(),
+            bare: None,
         })
     }
 
@@ -223,11 +229,27 @@ impl Store {
     }
 
     /// The file that holds an object of a folder: a thread of its own that reads many small parts of many objects takes a tenth of what
-    /// a request each takes. None of another store, or where a layer is to see requests.
+    /// a request each takes. None of another store, where a layer is to see requests, and of fields that may lie elsewhere.
     pub fn file(&self, key: &ObjectKey) -> Option<PathBuf> {
         match &self.place {
+            Place::Folder(_) if self.bare.is_some() && Kind::of(key) == Some(Kind::Field) => None,
             Place::Folder(root) if !self.is_layered => Some(root.join(key.as_str())),
             Place::Folder(_) | Place::Memory | Place::Cloud | Place::Hdfs => None,
+        }
+    }
+
+    /// Do its requests pass through a layer that is to see them all?
+    pub(crate) fn is_layered(&self) -> bool {
+        self.is_layered
+    }
+
+    /// The same store, which lies over a bare one: what differs are fields alone.
+    #[must_use]
+    pub(crate) fn over(self, bare: Box<Self>, is_layered: bool) -> Self {
+        Self {
+            bare: Some(bare),
+            is_layered,
+            ..self
         }
     }
 

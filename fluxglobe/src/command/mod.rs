@@ -2,6 +2,7 @@
 
 mod adapters;
 mod analysis;
+mod attach;
 mod budget;
 pub(crate) mod derive;
 mod export;
@@ -38,6 +39,7 @@ pub(crate) async fn run(settings: &Settings, command: Command) -> Result<ExitCod
     match command {
         Command::Demo(options) => return Box::pin(demo::run(settings, options)).await,
         Command::Ingest(options) => return ingest::run(settings, options).await,
+        Command::Attach(options) => attach::run(settings, &options).await?,
         Command::Products(options) => match &options.of {
             Some(ProductsOf::FillError(options)) => fill_error::run(settings, options).await?,
             None => products::run(settings, &options).await?,

@@ -14,7 +14,7 @@ use storage::{StorageError, Store};
 use tokio::task::JoinHandle;
 
 use crate::cli::Settings;
-use crate::protocol;
+use crate::{deployment, protocol};
 
 /// A service that lives and is not yet ready; clones are of the same one.
 #[derive(Clone)]
@@ -83,7 +83,7 @@ impl ServiceContext {
     /// The object store, once it is there and proven to hold what it is given. None if asked to stop before.
     pub(crate) async fn store(&self) -> Result<Option<Store>> {
         let open = || async {
-            let store = Store::open(&self.store_url)?;
+            let store = deployment::with_attached(&Store::open(&self.store_url)?);
             store.check_writable().await?;
             protocol::agree(&store).await?;
             Ok::<_, protocol::ProtocolError>(store)

@@ -24,7 +24,7 @@ use merge::{Change, Merged};
 
 pub(crate) use extent::FIELDS_AT_ONCE;
 pub(crate) use mend::mend;
-pub(crate) use merge::is_later_or_same;
+pub(crate) use merge::{is_later_or_same, is_same_grid};
 pub(crate) use replace::replace;
 pub(crate) use unchanged::Unchanged;
 pub(crate) use unchanged::answer as answer_unchanged;
@@ -81,8 +81,13 @@ async fn publish(store: &Store, granules: &[StoredGranule]) -> Result<Vec<Answer
     }
 }
 
+/// Pauses between attempts to publish.
+pub(crate) fn attempts() -> Pauses {
+    ATTEMPTS.pauses()
+}
+
 /// Waits before the next attempt, if one is left.
-async fn race_lost(product: &ProductId, pauses: &mut Pauses) -> Result<(), IngestError> {
+pub(crate) async fn race_lost(product: &ProductId, pauses: &mut Pauses) -> Result<(), IngestError> {
     let Some(pause) = pauses.next() else {
         return Err(IngestError::Contended {
             product: product.to_string(),

@@ -127,6 +127,20 @@ pub enum IngestError {
         /// What is in the way and what to do.
         detail: String,
     },
+    /// A store of others does not answer.
+    #[error(transparent)]
+    Foreign {
+        /// Where and why.
+        source: cube::foreign::ForeignError,
+    },
+    /// A product cannot be attached so; what readers see is unchanged.
+    #[error("{product} cannot be attached: {detail}")]
+    Attach {
+        /// Product.
+        product: String,
+        /// What is in the way and what to do.
+        detail: String,
+    },
     /// A synthetic file could not be written.
     #[error("cannot write {file:?}: {detail}")]
     Generate {
@@ -179,6 +193,7 @@ impl IngestError {
                 SinkCause::Store => Cause::Place,
                 SinkCause::Observations => Cause::Granule,
             },
+            Self::Foreign { source } if source.is_retryable => Cause::Passing,
             Self::Changed { .. } | Self::Contended { .. } | Self::Spool { .. } | Self::Killed => {
                 Cause::Passing
             }
@@ -188,7 +203,9 @@ impl IngestError {
             | Self::Client { .. }
             | Self::Digest { .. }
             | Self::Generate { .. } => Cause::Place,
-            Self::Profile { .. }
+            Self::Foreign { .. }
+            | Self::Attach { .. }
+            | Self::Profile { .. }
             | Self::Reread { .. }
             | Self::Contract(_)
             | Self::Task(_)

@@ -1,7 +1,9 @@
 //! [`RawGranule`] in, [`InspectedGranule`] out: what the file holds, as its reader process says, within the limits.
 
+pub(crate) mod arrays;
 pub(crate) mod file;
 pub mod reader;
+pub(crate) mod values;
 
 use contract::event::RejectReason;
 

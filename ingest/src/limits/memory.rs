@@ -14,7 +14,7 @@ use crate::encode::HELD_BYTES;
 use crate::fetch;
 use crate::inspect::file::description::Description;
 use crate::observation::{MAX_OBSERVATIONS, MAX_VALUES, OBSERVATION_BYTES};
-use crate::plan::PlannedGranule;
+use crate::plan::{Plan, PlannedGranule};
 
 /// Bytes of a cell while its band is worked on. At most at once: 8 as the reader has it and 8 as it comes here; 8 as it
 /// came and 4 as it is stored; 4 as it is stored, up to 12 in a list that grows, 4 and 4 in pages and in the object.
@@ -39,27 +39,28 @@ const TEXT_BYTES_PER_OBSERVATION: u64 = 4;
 
 /// Maps of a file that are worked on at a time: as many as processors have something to do with, while the next is read, and
 /// one of what is large.
-pub(crate) fn grids_at_once(planned: &PlannedGranule, limits: &Limits) -> usize {
+pub(crate) fn grids_at_once(plan: &Plan, limits: &Limits) -> usize {
     let processors = std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
-    let map = map_bytes(planned, limits).max(1);
-    let most = planned.steps.len().min(processors + MAPS_WAITING);
+    let map = map_bytes(plan, limits).max(1);
+    let most = plan.steps.len().min(processors + MAPS_WAITING);
     ((MAPS_BYTES / map) as usize).clamp(1, most.max(1))
 }
 
 /// A file of maps: a few at a time, whatever their number, and of each no more than its bands.
 pub(crate) fn of_grids(planned: &PlannedGranule, limits: &Limits) -> u64 {
-    let map = map_bytes(planned, limits);
-    let map = map.saturating_mul(grids_at_once(planned, limits) as u64);
-    let reading = map.saturating_add(planned.session.library_bytes());
-    let raw = planned.raw.size_bytes.min(fetch::HELD_BYTES);
+    let PlannedGranule { raw, plan } = planned;
+    let map = map_bytes(plan, limits);
+    let map = map.saturating_mul(grids_at_once(plan, limits) as u64);
+    let reading = map.saturating_add(plan.values.library_bytes());
+    let raw = raw.size_bytes.min(fetch::HELD_BYTES);
     reading.max(raw.saturating_mul(RAW_COPIES))
 }
 
 /// What is held of a map that is worked on.
-fn map_bytes(planned: &PlannedGranule, limits: &Limits) -> u64 {
+fn map_bytes(plan: &Plan, limits: &Limits) -> u64 {
     of_map(
-        planned.plane_cells(),
-        planned.mapping.grid.cols,
+        plan.plane_cells(),
+        plan.mapping.grid.cols,
         limits.band_cells,
     )
 }

@@ -26,7 +26,7 @@ use crate::encode::{EncodedGrid, Encoding};
 use crate::error::{IngestError, Rejection, Stop};
 use crate::fetch::RawGranule;
 use crate::limits::memory;
-use crate::plan::PlannedGranule;
+use crate::plan::{Plan, PlannedGranule};
 use crate::put::reading::Reading;
 use crate::{decode, put};
 
@@ -35,40 +35,41 @@ impl Pipeline<'_> {
     pub(crate) async fn grids(
         &self,
         shown: &Path,
-        mut planned: PlannedGranule,
+        planned: PlannedGranule,
         newest: Option<&Manifest>,
     ) -> Result<(Reading, MaskedCells), Stop> {
+        let PlannedGranule { raw, mut plan } = planned;
         let limits = &self.settings.limits;
-        let at_once = memory::grids_at_once(&planned, limits);
+        let at_once = memory::grids_at_once(&plan, limits);
         let grids = Grids {
             pipeline: *self,
             shown,
-            count: planned.steps.len(),
-            quantity: planned.target.quantity,
-            product: planned.target.product.clone(),
-            grid: planned.mapping.grid,
-            bands: bands(&planned.mapping.grid, limits.band_cells).collect(),
-            variable: planned.variable.name.clone(),
-            raw: planned.raw.clone(),
+            count: plan.steps.len(),
+            quantity: plan.target.quantity,
+            product: plan.target.product.clone(),
+            grid: plan.mapping.grid,
+            bands: bands(&plan.mapping.grid, limits.band_cells).collect(),
+            variable: plan.variable.name.clone(),
+            raw: raw.clone(),
             newest,
         };
         let Stored {
             mut steps,
             masked,
             range,
-        } = grids.all(&mut planned, at_once).await?;
-        planned.raw.check_unchanged()?;
+        } = grids.all(&mut plan, at_once).await?;
+        raw.check_unchanged()?;
         if steps.is_empty() {
-            return Err(without_values(&planned, masked).into());
+            return Err(without_values(&plan, masked).into());
         }
         steps.sort_by_key(|step| step.period);
-        let PlannedGranule {
+        let Plan {
             target,
             mapping,
             recipe,
             assumptions,
             ..
-        } = planned;
+        } = plan;
         let mut target = target;
         if let Some(range) = range {
             let over = target.quantity.over(range);
@@ -100,7 +101,7 @@ struct Grids<'a> {
 impl Grids<'_> {
     /// All steps that hold a value, and what was masked in all. The reader reads one band after the other; what is to be done
     /// with each is done beside that.
-    async fn all(&self, planned: &mut PlannedGranule, at_once: usize) -> Result<Stored, Stop> {
+    async fn all(&self, plan: &mut Plan, at_once: usize) -> Result<Stored, Stop> {
         let Pipeline {
             progress, metrics, ..
         } = self.pipeline;
@@ -112,7 +113,7 @@ impl Grids<'_> {
                     all.take(done?);
                 }
             }
-            let step = planned.steps[index];
+            let step = plan.steps[index];
             progress.stage(self.shown, Stage::Decode, index + 1, self.count);
             // One band is worked on while the next is read, and no further one is asked for.
             let (given, taken) = mpsc::channel(1);
@@ -122,7 +123,7 @@ impl Grids<'_> {
                     let Ok(room) = given.reserve().await else {
                         return Ok(None);
                     };
-                    let decoded = decode::run(planned, step, rows.clone());
+                    let decoded = decode::run(plan, step, rows.clone());
                     let decoded = metrics.timed("decode", decoded).await?;
                     room.send(decoded);
                     Ok::<_, Stop>(Some(()))
@@ -279,10 +280,10 @@ impl Stored {
 }
 
 /// The refusal of a file all of whose steps are empty.
-fn without_values(planned: &PlannedGranule, masked: MaskedCells) -> Rejection {
+pub(crate) fn without_values(plan: &Plan, masked: MaskedCells) -> Rejection {
     let gap = if masked.is_none() { "" } else { " (" };
     let end = if masked.is_none() { "" } else { ")" };
-    let detail = match &planned.quality {
+    let detail = match &plan.quality {
         None => format!(
             "holds no value in any step{gap}{masked}{end}; correct fill value or valid range in a profile"
         ),
@@ -291,7 +292,7 @@ fn without_values(planned: &PlannedGranule, masked: MaskedCells) -> Rejection {
             quality.variable
         ),
     };
-    Rejection::new(RejectReason::Values, &planned.variable.name, detail)
+    Rejection::new(RejectReason::Values, &plan.variable.name, detail)
 }
 
 /// The field that a version has for a period.

@@ -1,6 +1,6 @@
 //! The whole way of one file, verb by verb: to where its objects are durable, and with others of its product into a manifest.
 
-mod grids;
+pub(crate) mod grids;
 pub(crate) mod metrics;
 mod observing;
 pub(crate) mod progress;
@@ -156,7 +156,7 @@ impl Pipeline<'_> {
         self.progress.stage(way.shown, Stage::Plan, 0, 0);
         let planned = plan::run(inspected, wish, self.settings);
         let planned = metrics.timed("plan", planned).await?;
-        let product = planned.target.product.clone();
+        let product = planned.plan.target.product.clone();
         let newest = self.newest(&planned).await?;
         let unchanged = newest
             .as_ref()
@@ -191,7 +191,7 @@ impl Pipeline<'_> {
         &self,
         planned: &PlannedGranule,
     ) -> Result<Option<Manifest>, IngestError> {
-        let newest = manifests::latest(self.store, &planned.target.product).await;
+        let newest = manifests::latest(self.store, &planned.plan.target.product).await;
         newest.map_err(IngestError::storage("read the newest manifest"))
     }
 
@@ -231,14 +231,17 @@ fn unchanged(
     place: NoticeOrder,
 ) -> Option<(Versioned, Unchanged)> {
     if wish.profile.is_some()
-        || planned.steps.is_empty()
-        || newest.quantity.joined(planned.target.quantity).is_none()
-        || newest.grid != planned.mapping.grid
+        || planned.plan.steps.is_empty()
+        || newest
+            .quantity
+            .joined(planned.plan.target.quantity)
+            .is_none()
+        || newest.grid != planned.plan.mapping.grid
     {
         return None;
     }
     let raw_sha256 = planned.raw.sha256;
-    let periods: Vec<Period> = planned.steps.iter().map(|s| s.period).collect();
+    let periods: Vec<Period> = planned.plan.steps.iter().map(|s| s.period).collect();
     let orders = newest.notice_orders();
     let (mut is_superseded, mut masked) = (false, MaskedCells::default());
     for period in &periods {

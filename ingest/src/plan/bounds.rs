@@ -86,7 +86,7 @@ async fn dates(
     }
     let parts = vec![Part::All; lens.len()];
     let unit = stamps::unit(planning, time, None, None)?;
-    let numbers = planning.session.read(bounds, &parts, count * 2).await?;
+    let numbers = planning.values.read(bounds, &parts, count * 2).await?;
     let date = |number: f64| unit.date(number).map_err(|e| refused(bounds, e));
     let pair = |pair: &[f64]| Ok([date(pair[0])?, date(pair[1])?]);
     let pairs = numbers.chunks_exact(2).map(pair);

@@ -25,7 +25,7 @@ use crate::error::{Rejection, Stop};
 use crate::fetch::RawGranule;
 use crate::inspect::InspectedGranule;
 use crate::inspect::file::description::{Description, Part, Variable};
-use crate::inspect::reader::session::Session;
+use crate::inspect::values::Values;
 use crate::limits::Limits;
 use crate::plan::cf::axis::Mapping;
 use crate::plan::cf::coordinate::{self, Axis, Role};
@@ -35,11 +35,17 @@ use crate::plan::profile::Profile;
 use crate::plan::recipe::Recipe;
 use crate::settings::Settings;
 pub(crate) use quality::Quality;
+pub(crate) use target::packing;
 
 /// A file of which is known what will be read and what it will become.
 pub(crate) struct PlannedGranule {
     pub(crate) raw: RawGranule,
-    pub(crate) session: Session,
+    pub(crate) plan: Plan,
+}
+
+/// What will be read of a file, or of a store of others, and what it will become.
+pub(crate) struct Plan {
+    pub(crate) values: Values,
     pub(crate) target: Target,
     pub(crate) variable: Variable,
     pub(crate) axes: Vec<Axis>,
@@ -53,7 +59,7 @@ pub(crate) struct PlannedGranule {
     pub(crate) assumptions: Vec<String>,
 }
 
-impl PlannedGranule {
+impl Plan {
     /// Cells of one map as it lies in the file.
     pub(crate) fn plane_cells(&self) -> u64 {
         let is_plane = |axis: &&Axis| matches!(axis.role, Role::Latitude | Role::Longitude);
@@ -92,7 +98,7 @@ pub(crate) struct Wish<'a> {
 
 /// A file on its way through planning.
 struct Planning<'a> {
-    session: Session,
+    values: Values,
     file: &'a Description,
     file_name: &'a str,
     profile: Option<&'a Profile>,
@@ -107,7 +113,6 @@ pub(crate) async fn run(
     wish: Wish<'_>,
     settings: &Settings,
 ) -> Result<PlannedGranule, Stop> {
-    let limits = settings.limits;
     let InspectedGranule {
         raw,
         session,
@@ -116,11 +121,24 @@ pub(crate) async fn run(
     let fits = |profile: &&Profile| profile.is_for(&raw.file_name, &description);
     let profile = wish.profile.or_else(|| settings.profiles.iter().find(fits));
     let wish = Wish { profile, ..wish };
-    let (variable, meaning, assumption) = target::choose(&description, wish)?;
+    let held = (Values::Process(Box::new(session)), &description);
+    let plan = plan(held, &raw.file_name, wish, settings.limits).await?;
+    Ok(PlannedGranule { raw, plan })
+}
+
+/// The same of anything that was described and gives values: the one way from what is said to what is stored.
+pub(crate) async fn plan(
+    (values, description): (Values, &Description),
+    file_name: &str,
+    wish: Wish<'_>,
+    limits: Limits,
+) -> Result<Plan, Stop> {
+    let profile = wish.profile;
+    let (variable, meaning, assumption) = target::choose(description, wish)?;
     let mut planning = Planning {
-        session,
-        file: &description,
-        file_name: &raw.file_name,
+        values,
+        file: description,
+        file_name,
         profile,
         limits,
         assumptions: assumption.into_iter().collect(),
@@ -136,19 +154,19 @@ pub(crate) async fn run(
     }
     let target = target::target(&planning, variable, wish, meaning.quantity)?;
     let steps = steps::convert(variable, profile, meaning, &periods)?;
-    let packing = target::packing(variable, profile)?;
+    let packing = packing(variable, profile)?;
     packing
         .assumption
         .iter()
         .for_each(|text| planning.assume(text));
     let quality = quality::plan(&mut planning, variable, &axes)?;
     let Planning {
-        session,
+        values,
         assumptions,
         ..
     } = planning;
-    Ok(PlannedGranule {
-        session,
+    Ok(Plan {
+        values,
         target,
         variable: variable.clone(),
         axes,
@@ -158,7 +176,6 @@ pub(crate) async fn run(
         quality,
         recipe: Recipe::of(wish),
         assumptions,
-        raw,
     })
 }
 
@@ -202,7 +219,7 @@ impl Planning<'_> {
         }
         let parts = vec![Part::All; variable.dimensions.len()];
         let packing = Packing::of(variable);
-        let stored = self.session.read(name, &parts, count).await?;
+        let stored = self.values.read(name, &parts, count).await?;
         Ok(stored.into_iter().map(|v| packing.value(v)).collect())
     }
 

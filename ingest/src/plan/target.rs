@@ -206,7 +206,7 @@ fn product_name(variable: &str) -> Option<ProductId> {
 }
 
 /// The packing of the file, with what the profile overrides.
-pub(super) fn packing(
+pub(crate) fn packing(
     variable: &Variable,
     profile: Option<&Profile>,
 ) -> Result<Packing, Rejection> {

@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use async_trait::async_trait;
 use contract::key::ObjectKey;
 use contract::kind::Kind;
+use contract::manifest::Manifest;
 
 use super::{Kept, Owner};
 use crate::{StorageError, Store};
@@ -29,11 +30,12 @@ impl Owner for Versions {
 
     async fn in_use(
         &self,
-        _store: &Store,
+        store: &Store,
         kept: &Kept,
     ) -> Result<BTreeSet<ObjectKey>, StorageError> {
         let mut keys = BTreeSet::new();
         for manifest in &kept.manifests {
+            keys.extend(attachments(store, manifest).await?);
             let product = &manifest.product;
             keys.insert(ObjectKey::manifest(product, manifest.number));
             keys.insert(manifest.domain.clone());
@@ -48,6 +50,29 @@ impl Owner for Versions {
         }
         Ok(keys)
     }
+}
+
+/// What the steps of an attached version refer to: that is newer than what the version names where the product was attached
+/// again.
+async fn attachments(
+    store: &Store,
+    manifest: &Manifest,
+) -> Result<BTreeSet<ObjectKey>, StorageError> {
+    let mut keys = BTreeSet::new();
+    if store.attached_to(manifest).await?.is_none() {
+        return Ok(keys);
+    }
+    for step in &manifest.steps {
+        match store.reference(&step.field).await {
+            Ok(Some(reference)) => {
+                keys.insert(ObjectKey::raw(&manifest.product, &reference.attachment));
+            }
+            Ok(None) | Err(StorageError::Damaged { .. }) => {}
+            Err(e) if e.is_not_found() => {}
+            Err(e) => return Err(e),
+        }
+    }
+    Ok(keys)
 }
 
 /// Drawn pictures: kept while they are young.

@@ -170,7 +170,7 @@ fn of_unit(quantity: Quantity) -> String {
     }
 }
 
-pub(super) fn is_same_grid(a: &Grid, b: &Grid) -> bool {
+pub(crate) fn is_same_grid(a: &Grid, b: &Grid) -> bool {
     let near = |x: f64, y: f64, cell: f64| (x - y).abs() < SAME_GRID_CELLS * cell;
     (a.rows, a.cols) == (b.rows, b.cols)
         && near(a.north_deg, b.north_deg, a.dlat_deg)

@@ -112,6 +112,13 @@ impl From<f64> for NumberBits {
     }
 }
 
+impl NumberBits {
+    /// The number.
+    pub(crate) fn number(self) -> f64 {
+        f64::from_bits(self.0)
+    }
+}
+
 /// The part of one dimension to read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]

@@ -2,7 +2,7 @@
 
 use contract::event::RejectReason;
 use contract::grid::{Grid, wrap_lon_deg};
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use crate::error::Rejection;
 
@@ -32,7 +32,7 @@ pub(crate) enum Registration {
 }
 
 /// Where every cell of a stored grid is in the file.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Mapping {
     pub(crate) grid: Grid,
     /// Index along the file's latitude axis, for each row of the grid.

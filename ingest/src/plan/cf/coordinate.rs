@@ -3,11 +3,14 @@
 use contract::event::RejectReason;
 
 use super::projection;
+use serde::{Deserialize, Serialize};
+
 use crate::error::Rejection;
 use crate::inspect::file::description::{Description, Variable};
 
 /// What a dimension or a coordinate variable is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub(crate) enum Role {
     Latitude,
     Longitude,
@@ -16,7 +19,7 @@ pub(crate) enum Role {
 }
 
 /// A dimension of a variable: its role and, if it has one, its coordinate variable.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Axis {
     pub(crate) role: Role,
     pub(crate) coordinate: Option<String>,

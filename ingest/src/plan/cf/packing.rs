@@ -4,7 +4,9 @@
 //! and offset unpack to and wider than the stored one; then of values (NetCDF Users Guide, attribute conventions;
 //! CF 1.11, 2.5.1 and 8.1).
 
-use crate::inspect::file::description::{Attributes, Kind, Variable};
+use serde::{Deserialize, Serialize};
+
+use crate::inspect::file::description::{Attributes, Kind, NumberBits, Variable};
 
 /// From here on floating-point numbers are NetCDF's default fill values (9.97e36), or the 1e35 of older programs.
 const DEFAULT_FILL_FLOAT: f64 = 1e34;
@@ -29,6 +31,50 @@ pub(crate) struct Packing {
     is_float32: bool,
     /// What was taken for granted, if the file leaves it open.
     pub(crate) assumption: Option<String>,
+}
+
+/// A packing as JSON that keeps every bit.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct StoredPacking {
+    scale: NumberBits,
+    offset: NumberBits,
+    fills: Vec<NumberBits>,
+    valid_stored: [NumberBits; 2],
+    valid_values: [NumberBits; 2],
+    unsigned_wrap: Option<NumberBits>,
+    is_float32: bool,
+}
+
+impl From<&Packing> for StoredPacking {
+    fn from(own: &Packing) -> Self {
+        let range = |(low, high): Range| [low.into(), high.into()];
+        Self {
+            scale: own.scale.into(),
+            offset: own.offset.into(),
+            fills: own.fills.iter().map(|fill| (*fill).into()).collect(),
+            valid_stored: range(own.valid_stored),
+            valid_values: range(own.valid_values),
+            unsigned_wrap: own.unsigned_wrap.map(Into::into),
+            is_float32: own.is_float32,
+        }
+    }
+}
+
+impl From<&StoredPacking> for Packing {
+    fn from(stored: &StoredPacking) -> Self {
+        let range = |[low, high]: [NumberBits; 2]| (low.number(), high.number());
+        Self {
+            scale: stored.scale.number(),
+            offset: stored.offset.number(),
+            fills: stored.fills.iter().map(|fill| fill.number()).collect(),
+            valid_stored: range(stored.valid_stored),
+            valid_values: range(stored.valid_values),
+            unsigned_wrap: stored.unsigned_wrap.map(NumberBits::number),
+            is_float32: stored.is_float32,
+            assumption: None,
+        }
+    }
 }
 
 /// What a stored number is.

@@ -1,0 +1,225 @@
+//! One array of others: what it says of itself, and values of a part of it.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use serde_json::{Map, Value};
+use zarrs::array::{Array, ArrayMetadata, AsyncArrayShardedReadableExtCache, FillValueMetadata};
+use zarrs::plugin::ExtensionName as _;
+use zarrs::storage::AsyncReadableStorageTraits;
+
+use super::error::ForeignError;
+
+/// Most dimensions of an array.
+const MAX_RANK: usize = 32;
+/// Largest chunk, unpacked, bytes.
+const MAX_CHUNK_BYTES: u64 = 512 << 20;
+
+/// How the values of an array are stored.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ArrayKind {
+    /// Signed integers of this many bytes.
+    Integer(u8),
+    /// Unsigned integers of this many bytes.
+    Unsigned(u8),
+    /// Floating point of this many bytes: 4 or 8.
+    Float(u8),
+    /// Text, complex numbers, records and whatever else is no number.
+    Other,
+}
+
+/// What a chunk that is not there means.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Absent {
+    /// The fill value of the array.
+    Fill,
+    /// Nothing that can be told from a value: it is refused.
+    Refused,
+}
+
+/// An array of others.
+pub struct ForeignArray {
+    /// Its name in its group.
+    pub name: String,
+    /// Names, where it gives them, and lengths of its dimensions, slowest first.
+    pub dimensions: Vec<(Option<String>, u64)>,
+    /// How values are stored.
+    pub kind: ArrayKind,
+    /// Its attributes.
+    pub attributes: Map<String, Value>,
+    /// What stands for what was not written; none where the array defines none, or is of no numbers.
+    pub fill: Option<f64>,
+    /// Is it of Zarr version 2, where that value is the `_FillValue` of the CF conventions too?
+    pub is_zarr2: bool,
+    /// For messages.
+    pub(super) place: String,
+    pub(super) inner: Array<dyn AsyncReadableStorageTraits>,
+    /// Indexes of shards.
+    pub(super) shards: AsyncArrayShardedReadableExtCache,
+}
+
+impl ForeignArray {
+    /// What an opened array says.
+    pub(super) fn new(
+        name: &str,
+        place: &str,
+        inner: Array<dyn AsyncReadableStorageTraits>,
+    ) -> Result<Self, ForeignError> {
+        let place = format!("{place} array {name}");
+        let refused = |reason: String| ForeignError::refused(&place, reason);
+        let shape = inner.shape();
+        if shape.len() > MAX_RANK {
+            return Err(refused(format!(
+                "has {} dimensions, at most {MAX_RANK} are read",
+                shape.len()
+            )));
+        }
+        let attributes = inner.attributes().clone();
+        let (is_zarr2, is_filled) = match inner.metadata() {
+            ArrayMetadata::V2(own) => (true, own.fill_value != FillValueMetadata::Null),
+            ArrayMetadata::V3(_) => (false, true),
+        };
+        let names = match inner.dimension_names() {
+            Some(names) => names.clone(),
+            None => names_of(&attributes, shape.len()),
+        };
+        let kind = inner.data_type().name_v3();
+        let kind = kind.map_or(ArrayKind::Other, |name| kind_of(&name));
+        let fill = inner.fill_value().as_ne_bytes();
+        Ok(Self {
+            name: name.to_owned(),
+            dimensions: names.into_iter().zip(shape.iter().copied()).collect(),
+            kind,
+            fill: number(kind, fill).filter(|_| is_filled),
+            attributes,
+            is_zarr2,
+            shards: AsyncArrayShardedReadableExtCache::new(&inner),
+            place,
+            inner,
+        })
+    }
+
+    /// Bytes of one value; none of what is no number.
+    pub(super) fn value_bytes(&self) -> Option<u64> {
+        match self.kind {
+            ArrayKind::Integer(bytes) | ArrayKind::Unsigned(bytes) | ArrayKind::Float(bytes) => {
+                Some(bytes.into())
+            }
+            ArrayKind::Other => None,
+        }
+    }
+
+    /// Chunks that a part touches, by their indexes, each with the cells that it holds.
+    pub(super) fn chunks_of(&self, part: &[Range<u64>]) -> Result<Vec<ChunkCells>, ForeignError> {
+        let own = |e: String| ForeignError::refused(&self.place, e);
+        let rank = self.dimensions.len();
+        let fits = part.len() == rank
+            && part
+                .iter()
+                .zip(&self.dimensions)
+                .all(|(part, (_, len))| part.start < part.end && part.end <= *len);
+        if !fits {
+            return Err(own(format!("has no part {part:?}")));
+        }
+        let shape = zarrs::array::ArraySubset::new_with_ranges(part);
+        let chunks = self.inner.chunks_in_array_subset(&shape);
+        let chunks = chunks.map_err(|e| own(e.to_string()))?;
+        let chunks = chunks.ok_or_else(|| own("has chunks of no shape".to_owned()))?;
+        let mut all = vec![];
+        for index in &chunks.indices() {
+            let index = index.to_vec();
+            let cells = self.inner.chunk_subset(&index);
+            let cells = cells.map_err(|e| own(e.to_string()))?.to_ranges();
+            all.push((index, cells));
+        }
+        Ok(all)
+    }
+
+    /// Bytes of a chunk once it is unpacked.
+    ///
+    /// # Errors
+    /// They are too many.
+    pub(super) fn chunk_bytes(&self, cells: &[Range<u64>]) -> Result<u64, ForeignError> {
+        let value_bytes = self.value_bytes().ok_or_else(|| {
+            ForeignError::refused(&self.place, "holds no numbers of a kind that is read")
+        })?;
+        let bytes = cells.iter().fold(value_bytes, |bytes, cells| {
+            bytes.saturating_mul(cells.end - cells.start)
+        });
+        if bytes <= MAX_CHUNK_BYTES {
+            return Ok(bytes);
+        }
+        let reason = format!(
+            "has chunks of {bytes} bytes unpacked, at most {MAX_CHUNK_BYTES} are read: write it in smaller chunks"
+        );
+        Err(ForeignError::refused(&self.place, reason))
+    }
+}
+
+/// Names of dimensions as xarray writes them in Zarr version 2.
+fn names_of(attributes: &Map<String, Value>, rank: usize) -> Vec<Option<String>> {
+    let names = attributes
+        .get("_ARRAY_DIMENSIONS")
+        .and_then(Value::as_array);
+    match names.filter(|names| names.len() == rank) {
+        Some(names) => names
+            .iter()
+            .map(|name| name.as_str().map(str::to_owned))
+            .collect(),
+        None => vec![None; rank],
+    }
+}
+
+fn kind_of(name: &str) -> ArrayKind {
+    match name {
+        "int8" => ArrayKind::Integer(1),
+        "int16" => ArrayKind::Integer(2),
+        "int32" => ArrayKind::Integer(4),
+        "int64" => ArrayKind::Integer(8),
+        "uint8" | "bool" => ArrayKind::Unsigned(1),
+        "uint16" => ArrayKind::Unsigned(2),
+        "uint32" => ArrayKind::Unsigned(4),
+        "uint64" => ArrayKind::Unsigned(8),
+        "float32" => ArrayKind::Float(4),
+        "float64" => ArrayKind::Float(8),
+        _ => ArrayKind::Other,
+    }
+}
+
+/// A stored value, in the byte order of this machine, as a number.
+#[expect(
+    clippy::cast_precision_loss,
+    reason = "numbers of all kinds are worked on as float64, as those of files are"
+)]
+pub(super) fn number(kind: ArrayKind, bytes: &[u8]) -> Option<f64> {
+    macro_rules! of {
+        ($number:ty) => {
+            <$number>::from_ne_bytes(bytes.try_into().ok()?)
+        };
+    }
+    Some(match kind {
+        ArrayKind::Integer(1) => of!(i8).into(),
+        ArrayKind::Integer(2) => of!(i16).into(),
+        ArrayKind::Integer(4) => of!(i32).into(),
+        ArrayKind::Integer(_) => of!(i64) as f64,
+        ArrayKind::Unsigned(1) => of!(u8).into(),
+        ArrayKind::Unsigned(2) => of!(u16).into(),
+        ArrayKind::Unsigned(4) => of!(u32).into(),
+        ArrayKind::Unsigned(_) => of!(u64) as f64,
+        ArrayKind::Float(4) => of!(f32).into(),
+        ArrayKind::Float(_) => of!(f64),
+        ArrayKind::Other => return None,
+    })
+}
+
+impl std::fmt::Debug for ForeignArray {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_tuple("ForeignArray").field(&self.place).finish()
+    }
+}
+
+/// Index of a chunk, and the cells that it holds.
+pub(super) type ChunkCells = (Vec<u64>, Vec<Range<u64>>);
+
+/// Chunks, shared.
+pub(super) type Unpacked = Option<Arc<Vec<u8>>>;

@@ -1,0 +1,378 @@
+//! A store of others: what kind it is, its group and the arrays in it.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+use std::sync::Arc;
+
+use bytes::Bytes;
+use icechunk::format::SnapshotId;
+use icechunk::repository::VersionInfo;
+use serde_json::{Map, Value};
+use storage::attached::StoreKind;
+use zarrs::array::Array;
+use zarrs::config::MetadataRetrieveVersion;
+use zarrs::storage::{
+    AsyncListableStorageTraits as _, AsyncReadableStorageTraits, StoreKey, StorePrefix,
+};
+use zarrs_icechunk::AsyncIcechunkStore;
+
+use super::adapter::{Adapter, MAX_DOCUMENT_BYTES};
+use super::array::{Absent, ForeignArray};
+use super::chunks::Chunks;
+use super::error::ForeignError;
+use super::objects::Objects;
+use super::read_only::ReadOnly;
+use crate::error::first_lines;
+
+/// The branch of a repository whose newest state is read.
+const BRANCH: &str = "main";
+/// Most arrays of a group that are looked at.
+const MAX_ARRAYS: usize = 4096;
+
+/// What was found at an address.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Found {
+    /// What kind of store it is.
+    pub kind: StoreKind,
+    /// Of a repository the state to read; none: the newest of its branch `main`.
+    pub snapshot: Option<String>,
+}
+
+/// A group of arrays of others, opened.
+pub struct Foreign {
+    /// What it is.
+    pub found: Found,
+    /// Attributes of the group.
+    pub attributes: Map<String, Value>,
+    arrays: BTreeMap<String, Result<ForeignArray, ForeignError>>,
+    chunks: Chunks,
+    place: String,
+}
+
+/// Which arrays of a store to open.
+enum Wanted<'a> {
+    All(Vec<String>),
+    /// Where nothing is listed: this one, its coordinates, and their bounds.
+    Around(&'a str),
+    One(&'a str),
+}
+
+type Arrays = Arc<dyn AsyncReadableStorageTraits>;
+
+impl Found {
+    /// Looks what lies at an address.
+    ///
+    /// # Errors
+    /// Nothing that is read, or no answer.
+    pub async fn at(objects: &Arc<dyn Objects>) -> Result<Self, ForeignError> {
+        let of = |kind| {
+            Ok(Self {
+                kind,
+                snapshot: None,
+            })
+        };
+        for (name, kind) in [
+            ("zarr.json", StoreKind::Zarr3),
+            (".zmetadata", StoreKind::Zarr2),
+            (".zgroup", StoreKind::Zarr2),
+            ("repo", StoreKind::Icechunk),
+            ("refs/branch.main/ref.json", StoreKind::Icechunk),
+        ] {
+            if objects.size(name).await?.is_some() {
+                return of(kind);
+            }
+        }
+        let reason = if objects.size(".zarray").await?.is_some() {
+            "is a single array: give the group that it lies in, with its coordinates"
+        } else {
+            "is neither a Zarr group (zarr.json, .zgroup) nor an Icechunk repository (repo)"
+        };
+        Err(ForeignError::refused(objects.place(), reason))
+    }
+}
+
+impl Foreign {
+    /// Opens a group with all of its arrays. `wanted` is the one that is asked for: where nothing can be listed it is opened
+    /// with what it names.
+    ///
+    /// # Errors
+    /// It cannot be read. An array that cannot is told where it is asked for.
+    pub async fn open(
+        objects: Arc<dyn Objects>,
+        found: Found,
+        wanted: Option<&str>,
+    ) -> Result<Self, ForeignError> {
+        let place = objects.place();
+        match found.kind {
+            StoreKind::Icechunk => {
+                let (store, found) = repository(objects, found).await?;
+                let names = store.list_dir(&StorePrefix::root()).await;
+                let names = names.map_err(|e| ForeignError::refused(&place, first_lines(&e)))?;
+                let names = names.prefixes().iter();
+                let names = names.map(|name| name.as_str().trim_end_matches('/').to_owned());
+                let wanted = Wanted::All(names.collect());
+                Self::of((Arc::new(store), found), place, wanted).await
+            }
+            StoreKind::Zarr2 | StoreKind::Zarr3 => {
+                let documents = documents(&objects, found.kind).await?;
+                let names = match named(&documents) {
+                    names if names.is_empty() => objects.folders("").await?,
+                    names => Some(names),
+                };
+                let wanted = match (names, wanted) {
+                    (Some(names), _) => Wanted::All(names),
+                    (None, Some(wanted)) => Wanted::Around(wanted),
+                    (None, None) => {
+                        let reason = "has no consolidated metadata, and nothing can be listed here: say --variable, or write it with consolidated metadata";
+                        return Err(ForeignError::refused(place, reason));
+                    }
+                };
+                let documents = Arc::new(documents);
+                let adapter = Adapter { objects, documents };
+                Self::of((Arc::new(adapter), found), place, wanted).await
+            }
+        }
+    }
+
+    /// Opens one array alone.
+    pub async fn open_one(
+        objects: Arc<dyn Objects>,
+        found: Found,
+        array: &str,
+    ) -> Result<Self, ForeignError> {
+        let place = objects.place();
+        let (store, found): (Arrays, Found) = match found.kind {
+            StoreKind::Icechunk => {
+                let (store, found) = repository(objects, found).await?;
+                (Arc::new(store), found)
+            }
+            StoreKind::Zarr2 | StoreKind::Zarr3 => {
+                let documents = Arc::default();
+                (Arc::new(Adapter { objects, documents }), found)
+            }
+        };
+        Self::of((store, found), place, Wanted::One(array)).await
+    }
+
+    async fn of(
+        (store, found): (Arrays, Found),
+        place: String,
+        wanted: Wanted<'_>,
+    ) -> Result<Self, ForeignError> {
+        let mut own = Self {
+            attributes: Map::new(),
+            arrays: BTreeMap::new(),
+            chunks: Chunks::default(),
+            place,
+            found,
+        };
+        match wanted {
+            Wanted::One(name) => own.add(&store, name).await,
+            Wanted::All(names) => {
+                if names.len() > MAX_ARRAYS {
+                    let reason =
+                        format!("has {} arrays, at most {MAX_ARRAYS} are read", names.len());
+                    return Err(ForeignError::refused(own.place, reason));
+                }
+                own.attributes = group(&store, own.found.kind, &own.place).await?;
+                for name in names {
+                    own.add(&store, &name).await;
+                }
+            }
+            Wanted::Around(name) => {
+                own.attributes = group(&store, own.found.kind, &own.place).await?;
+                own.add(&store, name).await;
+                for _with_bounds in 0..2 {
+                    for name in own.mentioned() {
+                        own.add(&store, &name).await;
+                    }
+                }
+            }
+        }
+        Ok(own)
+    }
+
+    /// Opens an array; what is none is left out.
+    async fn add(&mut self, store: &Arrays, name: &str) {
+        if self.arrays.contains_key(name) {
+            return;
+        }
+        let version = match self.found.kind {
+            StoreKind::Zarr2 => MetadataRetrieveVersion::V2,
+            StoreKind::Zarr3 | StoreKind::Icechunk => MetadataRetrieveVersion::V3,
+        };
+        let opened = Array::async_open_opt(Arc::clone(store), &format!("/{name}"), &version).await;
+        let array = match opened {
+            Ok(array) => ForeignArray::new(name, &self.place, array),
+            Err(zarrs::array::ArrayCreateError::MissingMetadata) => return,
+            Err(e) => {
+                let reason = format!("cannot be read by this program: {}", first_lines(&e));
+                Err(ForeignError::refused(
+                    format!("{} array {name}", self.place),
+                    reason,
+                ))
+            }
+        };
+        self.arrays.insert(name.to_owned(), array);
+    }
+
+    /// Names of dimensions and of what attributes name, which may be arrays.
+    fn mentioned(&self) -> Vec<String> {
+        let mut names = vec![];
+        for array in self.arrays() {
+            names.extend(array.dimensions.iter().filter_map(|(name, _)| name.clone()));
+            for attribute in ["bounds", "climatology", "grid_mapping"] {
+                let name = array.attributes.get(attribute).and_then(Value::as_str);
+                names.extend(name.map(str::to_owned));
+            }
+            let coordinates = array.attributes.get("coordinates").and_then(Value::as_str);
+            let coordinates = coordinates.unwrap_or_default().split_whitespace();
+            names.extend(coordinates.map(str::to_owned));
+        }
+        let is_name = |name: &String| !name.contains('/') && !name.is_empty();
+        names.retain(is_name);
+        names.truncate(MAX_ARRAYS);
+        names
+    }
+
+    /// Arrays that can be read.
+    pub fn arrays(&self) -> impl Iterator<Item = &ForeignArray> {
+        self.arrays.values().filter_map(|array| array.as_ref().ok())
+    }
+
+    /// The array of a name.
+    ///
+    /// # Errors
+    /// It is not there, or cannot be read: a codec, say, that this program does not have.
+    pub fn array(&self, name: &str) -> Result<&ForeignArray, ForeignError> {
+        match self.arrays.get(name) {
+            Some(Ok(array)) => Ok(array),
+            Some(Err(error)) => Err(error.clone()),
+            None => {
+                let there: Vec<&str> = self.arrays().map(|array| array.name.as_str()).collect();
+                let reason = format!("has no array {name:?}; it has {}", there.join(", "));
+                Err(ForeignError::refused(&self.place, reason))
+            }
+        }
+    }
+
+    /// Values of a part of an array, row-major, as float64.
+    ///
+    /// # Errors
+    /// With place, array and chunk: what is not there, damaged, too large, or does not answer.
+    pub async fn read(
+        &self,
+        array: &str,
+        part: &[Range<u64>],
+        absent: Absent,
+    ) -> Result<Vec<f64>, ForeignError> {
+        self.chunks.read(self.array(array)?, part, absent).await
+    }
+}
+
+/// Opens a state of a repository.
+async fn repository(
+    objects: Arc<dyn Objects>,
+    found: Found,
+) -> Result<(AsyncIcechunkStore, Found), ForeignError> {
+    let place = objects.place();
+    let refused = |doing: &str, e: &dyn std::fmt::Display| {
+        ForeignError::refused(&place, format!("{doing}: {}", first_lines(e)))
+    };
+    let opened = icechunk::Repository::open(Arc::new(ReadOnly(objects)));
+    let opened = opened.execute().await;
+    let opened = opened.map_err(|e| refused("opening the Icechunk repository", &e))?;
+    let snapshot: SnapshotId = match &found.snapshot {
+        Some(text) => text.as_str().try_into().map_err(|_no_name: &str| {
+            refused("opening a state", &format!("{text:?} names none"))
+        })?,
+        None => opened
+            .lookup_branch(BRANCH)
+            .await
+            .map_err(|e| refused("reading the branch main", &e))?,
+    };
+    let version = VersionInfo::SnapshotId(snapshot.clone());
+    let session = opened.readonly_session(&version).await;
+    let session = session.map_err(|e| refused(&format!("opening the state {snapshot}"), &e))?;
+    let found = Found {
+        snapshot: Some(snapshot.to_string()),
+        ..found
+    };
+    Ok((AsyncIcechunkStore::new(session), found))
+}
+
+/// Documents of all arrays that came in one; nothing where they lie apart.
+async fn documents(
+    objects: &Arc<dyn Objects>,
+    kind: StoreKind,
+) -> Result<BTreeMap<String, Bytes>, ForeignError> {
+    let name = match kind {
+        StoreKind::Zarr2 => ".zmetadata",
+        StoreKind::Zarr3 | StoreKind::Icechunk => "zarr.json",
+    };
+    let mut all = BTreeMap::new();
+    let Some(content) = objects.get(name, None, MAX_DOCUMENT_BYTES).await? else {
+        return Ok(all);
+    };
+    let place = format!("{}/{name}", objects.place());
+    let root: Value = serde_json::from_slice(&content)
+        .map_err(|e| ForeignError::refused(&place, format!("is no JSON document: {e}")))?;
+    if root.get("node_type").and_then(Value::as_str) == Some("array") {
+        let reason = "is a single array: give the group that it lies in, with its coordinates";
+        return Err(ForeignError::refused(objects.place(), reason));
+    }
+    let together = match kind {
+        StoreKind::Zarr2 => root.get("metadata"),
+        StoreKind::Zarr3 | StoreKind::Icechunk => root
+            .get("consolidated_metadata")
+            .and_then(|own| own.get("metadata")),
+    };
+    for (name, document) in together.and_then(Value::as_object).into_iter().flatten() {
+        let name = match kind {
+            StoreKind::Zarr2 => name.clone(),
+            StoreKind::Zarr3 | StoreKind::Icechunk => format!("{name}/zarr.json"),
+        };
+        all.insert(name, document.to_string().into());
+    }
+    if kind == StoreKind::Zarr3 && !all.is_empty() {
+        all.insert(name.to_owned(), content);
+    }
+    Ok(all)
+}
+
+/// Arrays directly in the group that documents tell of.
+fn named(documents: &BTreeMap<String, Bytes>) -> Vec<String> {
+    let name = |key: &String| {
+        let (name, document) = key.split_once('/')?;
+        matches!(document, "zarr.json" | ".zarray").then(|| name.to_owned())
+    };
+    documents.keys().filter_map(name).collect()
+}
+
+/// Attributes of the group.
+async fn group(
+    store: &Arrays,
+    kind: StoreKind,
+    place: &str,
+) -> Result<Map<String, Value>, ForeignError> {
+    let name = match kind {
+        StoreKind::Zarr2 => ".zattrs",
+        StoreKind::Zarr3 | StoreKind::Icechunk => "zarr.json",
+    };
+    let refused = |e: String| ForeignError::refused(format!("{place}/{name}"), e);
+    let key = StoreKey::new(name).map_err(|e| refused(e.to_string()))?;
+    let document = store.get(&key).await;
+    let Some(document) = document.map_err(|e| refused(first_lines(&e)))? else {
+        return Ok(Map::new());
+    };
+    let mut root: Value = serde_json::from_slice(&document)
+        .map_err(|e| refused(format!("is no JSON document: {e}")))?;
+    let own = match kind {
+        StoreKind::Zarr2 => root,
+        StoreKind::Zarr3 | StoreKind::Icechunk => root["attributes"].take(),
+    };
+    Ok(match own {
+        Value::Object(attributes) => attributes,
+        _ => Map::new(),
+    })
+}

@@ -1,0 +1,158 @@
+//! Objects of a store of others, to read: by name, whole or in part.
+
+use std::fmt::Debug;
+use std::path::Path as FilePath;
+use std::sync::Arc;
+
+use async_trait::async_trait;
+use bytes::Bytes;
+use object_store::path::Path;
+use object_store::{Error, GetOptions, GetRange, ObjectStore, ObjectStoreExt as _};
+use storage::{StorageError, Store};
+
+use super::error::ForeignError;
+
+/// What holds objects; nothing of it can be written.
+#[async_trait]
+pub trait Objects: Debug + Send + Sync {
+    /// Where it is, for people: without anything secret.
+    fn place(&self) -> String;
+
+    /// An object, or a part of it; none if it is not there.
+    ///
+    /// # Errors
+    /// More than `most_bytes` would come: they are not fetched. The store does not answer, or not to us.
+    async fn get(
+        &self,
+        name: &str,
+        part: Option<GetRange>,
+        most_bytes: u64,
+    ) -> Result<Option<Bytes>, ForeignError>;
+
+    /// The size of an object, bytes; none if it is not there.
+    async fn size(&self, name: &str) -> Result<Option<u64>, ForeignError>;
+
+    /// Names of what lies directly in a folder (`""`: the whole); none where nothing can be listed.
+    async fn folders(&self, folder: &str) -> Result<Option<Vec<String>>, ForeignError>;
+}
+
+/// Objects in a folder or a bucket.
+#[derive(Debug)]
+pub struct StoredObjects {
+    objects: Arc<dyn ObjectStore>,
+    place: String,
+}
+
+impl StoredObjects {
+    /// Opens a folder that is there, or the part of a bucket below a prefix: `s3://BUCKET/PREFIX` and the like, with credentials
+    /// from the variables of the environment that their clouds know.
+    ///
+    /// # Errors
+    /// There is no such folder, or it is no such address.
+    pub fn open(location: &str) -> Result<Self, ForeignError> {
+        let shown = |e: StorageError| match e {
+            StorageError::Location { location, reason } => ForeignError::refused(location, reason),
+            other => ForeignError::refused("the store", other.to_string()),
+        };
+        let folder = location.strip_prefix("file://").unwrap_or(location);
+        let is_folder = !folder.contains("://");
+        // Opening a folder would make it.
+        if is_folder && !FilePath::new(folder).is_dir() {
+            return Err(ForeignError::refused(location, "there is no such folder"));
+        }
+        let store = Store::open(if is_folder { folder } else { location }).map_err(shown)?;
+        let place = store.url().trim_end_matches('/');
+        let place = place.strip_prefix("file://").unwrap_or(place).to_owned();
+        Ok(Self {
+            objects: store.object_store(),
+            place,
+        })
+    }
+
+    fn path(&self, name: &str) -> Result<Path, ForeignError> {
+        Path::parse(name).map_err(|e| ForeignError::refused(&self.place, e.to_string()))
+    }
+
+    fn failed(&self, name: &str, error: Error) -> ForeignError {
+        let place = format!("{}/{name}", self.place);
+        match error {
+            Error::PermissionDenied { .. } | Error::Unauthenticated { .. } => {
+                ForeignError::refused(
+                    place,
+                    "the store does not let it be read: the credentials of the environment are missing, wrong or have ended",
+                )
+            }
+            source => {
+                let error = StorageError::Object {
+                    key: name.to_owned(),
+                    source,
+                };
+                ForeignError {
+                    place,
+                    reason: error.to_string(),
+                    is_retryable: error.is_retryable(),
+                }
+            }
+        }
+    }
+}
+
+#[async_trait]
+impl Objects for StoredObjects {
+    fn place(&self) -> String {
+        self.place.clone()
+    }
+
+    async fn get(
+        &self,
+        name: &str,
+        part: Option<GetRange>,
+        most_bytes: u64,
+    ) -> Result<Option<Bytes>, ForeignError> {
+        let options = GetOptions {
+            range: part,
+            ..GetOptions::default()
+        };
+        let found = match self.objects.get_opts(&self.path(name)?, options).await {
+            Ok(found) => found,
+            Err(Error::NotFound { .. }) => return Ok(None),
+            Err(e) => return Err(self.failed(name, e)),
+        };
+        let size_bytes = found.range.end - found.range.start;
+        if size_bytes > most_bytes {
+            return Err(too_large(
+                &format!("{}/{name}", self.place),
+                size_bytes,
+                most_bytes,
+            ));
+        }
+        let content = found.bytes().await;
+        content.map(Some).map_err(|e| self.failed(name, e))
+    }
+
+    async fn size(&self, name: &str) -> Result<Option<u64>, ForeignError> {
+        match self.objects.head(&self.path(name)?).await {
+            Ok(meta) => Ok(Some(meta.size)),
+            Err(Error::NotFound { .. }) => Ok(None),
+            Err(e) => Err(self.failed(name, e)),
+        }
+    }
+
+    async fn folders(&self, folder: &str) -> Result<Option<Vec<String>>, ForeignError> {
+        let path = self.path(folder)?;
+        let found = self.objects.list_with_delimiter(Some(&path)).await;
+        let found = found.map_err(|e| self.failed(folder, e))?;
+        let folders = found.common_prefixes.iter();
+        let mut names: Vec<String> = folders
+            .filter_map(|path| Some(path.filename()?.to_owned()))
+            .collect();
+        names.sort();
+        Ok(Some(names))
+    }
+}
+
+/// The refusal of an object that is larger than may be.
+pub(super) fn too_large(place: &str, size_bytes: u64, most_bytes: u64) -> ForeignError {
+    let reason = format!("has {size_bytes} bytes, at most {most_bytes} are read");
+    ForeignError::refused(place, reason)
+}

@@ -1,0 +1,59 @@
+//! Words of `fluxglobe attach`.
+
+use clap::Args;
+use contract::product::ProductId;
+
+/// `fluxglobe attach`.
+#[derive(Debug, Args)]
+#[command(after_long_help = "\
+Each step is read once: its variable, unit, sign, grid and time are found as those of a file are (CF conventions, or a profile), and what
+cannot be read rightly is refused. What is stored of it is the digest of its values and where they lie, a few hundred bytes. Whoever reads
+the product then, a tile, a budget, a series, SQL or an export, has the values from there, and compares them with the digest: values that
+changed there since are an error and never a number. Nothing is written to the store that is attached.
+
+  Zarr 2, Zarr 3      a group: a folder, or a part of a bucket (s3://, gs://, az://)
+  Icechunk            a repository, alike; what is read is the state that its branch main had when it was attached, whatever is
+                      committed there later
+
+Credentials for buckets come from the environment (AWS_*, GOOGLE_*, AZURE_*; docs/operations.md) and are not stored: whoever reads the
+product needs them too, and in a cluster every service needs the way to the store.
+
+What came since, or was revised, comes with --refresh, as the product's next version. A product that was landed is not attached over.
+
+Examples:
+  fluxglobe attach /data/sst.zarr --variable analysed_sst --product sst-attached
+  fluxglobe attach s3://BUCKET/flux.icechunk --variable fgco2
+  fluxglobe attach /data/ocean.zarr --variable thetao --index depth=0
+  fluxglobe attach --refresh sst-attached")]
+pub(crate) struct Attach {
+    /// Where the store is: a folder, or `s3://BUCKET/PREFIX`, `gs://BUCKET/PREFIX`, `az://CONTAINER/PREFIX`.
+    #[arg(value_name = "URL", required_unless_present = "refresh")]
+    pub(crate) url: Option<String>,
+    /// Array of the values.
+    #[arg(long, value_name = "NAME", required_unless_present_any = ["refresh", "profile"])]
+    pub(crate) variable: Option<String>,
+    /// Name of a shipped profile or a profile file (TOML), where the CF conventions do not say enough: it names the array, and what
+    /// its quantity, unit, sign, grid and time are.
+    #[arg(long, value_name = "NAME|FILE", conflicts_with = "variable")]
+    pub(crate) profile: Option<String>,
+    /// Product to attach as, if not one of the array's or the profile's name.
+    #[arg(long, value_name = "PRODUCT")]
+    pub(crate) product: Option<ProductId>,
+    /// Of a dimension beside time, latitude and longitude the index that is read, from 0 on: a depth, a height, a member. May
+    /// be given several times.
+    #[arg(long, value_name = "DIMENSION=INDEX", value_parser = index)]
+    pub(crate) index: Vec<(String, u64)>,
+    /// Attach anew what this product is attached to: steps that came since or were revised become its next version.
+    #[arg(long, value_name = "PRODUCT", conflicts_with_all = ["url", "variable", "profile", "product", "index"])]
+    pub(crate) refresh: Option<ProductId>,
+    /// JSON instead of text.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+fn index(text: &str) -> Result<(String, u64), String> {
+    let parts = text.split_once('=').filter(|(name, _)| !name.is_empty());
+    let (name, index) = parts.ok_or("give DIMENSION=INDEX, such as depth=0")?;
+    let index = index.parse().map_err(|e| format!("{index:?}: {e}"))?;
+    Ok((name.to_owned(), index))
+}

@@ -1,0 +1,146 @@
+//! A reference in, the values that it refers to out: the way of the landing, from the plan that the attachment keeps.
+
+use std::sync::Arc;
+
+use async_trait::async_trait;
+use contract::masked::MaskedCells;
+use cube::foreign::{Absent, Foreign, ForeignError, Found};
+use quick_cache::sync::Cache;
+use storage::attached::{Attachment, Failure, Reference, Source, StoreKind};
+
+use super::address;
+use super::reading::Reading;
+use crate::check::Found as FoundValues;
+use crate::decode::{DecodedBand, Slab, converted, is_plane};
+use crate::inspect::arrays::Arrays;
+use crate::limits::Limits;
+use crate::plan::PlannedStep;
+use crate::plan::cf::packing::Packing;
+use crate::plan::cf::unmarked::Ends;
+
+/// Stores of others that are kept open: each may hold a hundred megabytes of chunks.
+const KEPT_STORES: usize = 4;
+
+/// What tells arrays of stores apart.
+type Name = (String, StoreKind, Option<String>, String);
+
+/// Reads fields of attached products from where they lie, with the credentials of this process' environment.
+#[derive(Debug)]
+pub struct ForeignFields {
+    open: Cache<Name, Arc<Foreign>>,
+}
+
+impl Default for ForeignFields {
+    fn default() -> Self {
+        Self {
+            open: Cache::new(KEPT_STORES),
+        }
+    }
+}
+
+impl ForeignFields {
+    async fn foreign(&self, attachment: &Attachment) -> Result<Arc<Foreign>, ForeignError> {
+        let Attachment {
+            store,
+            kind,
+            snapshot,
+            array,
+            ..
+        } = attachment;
+        let name = (store.clone(), *kind, snapshot.clone(), array.clone());
+        let open = async {
+            let found = Found {
+                kind: *kind,
+                snapshot: snapshot.clone(),
+            };
+            let opened = Foreign::open_one(address::open(store)?, found, array).await?;
+            Ok(Arc::new(opened))
+        };
+        self.open.get_or_insert_async(&name, open).await
+    }
+}
+
+#[async_trait]
+impl Source for ForeignFields {
+    async fn values(
+        &self,
+        attachment: &Arc<Attachment>,
+        reference: &Reference,
+    ) -> Result<Vec<f32>, Failure> {
+        let period = reference.period;
+        let place = || format!("{} step {period}", attachment.place());
+        let refused = |reason: String| Failure {
+            place: place(),
+            reason,
+            is_retryable: false,
+        };
+        let reading = Reading::of(attachment).map_err(refused)?;
+        let failed = |error: ForeignError| {
+            let advice = if error.is_retryable {
+                String::new()
+            } else {
+                format!(
+                    "; if the store has changed since it was attached, run `fluxglobe attach --refresh {}`",
+                    attachment.product
+                )
+            };
+            Failure {
+                place: format!("step {period}, {}", error.place),
+                reason: format!("{}{advice}", error.reason),
+                is_retryable: error.is_retryable,
+            }
+        };
+        let foreign = self.foreign(attachment).await.map_err(failed)?;
+        let absent = if reading.absent_is_no_data {
+            Absent::Fill
+        } else {
+            Absent::Refused
+        };
+        let plane_cells = Limits::default().plane_cells;
+        let own = (attachment.array.clone(), absent);
+        let arrays = Arrays::new(foreign, reading.indexes.clone(), own, plane_cells);
+        let step = PlannedStep {
+            period,
+            time_index: reference.time_index,
+            factor: f64::from_bits(reference.conversion[0]),
+            offset: f64::from_bits(reference.conversion[1]),
+        };
+        let rows = 0..reading.mapping.file_rows.len() as u32;
+        let slab = Slab::of(&reading.mapping, step, &rows);
+        let parts: Vec<_> = reading.axes.iter().map(|axis| slab.part(axis)).collect();
+        let stored = arrays.values(&attachment.array, &parts).await;
+        let stored = stored.map_err(failed)?;
+        let made = tokio::task::spawn_blocking(move || made(&reading, step, &stored));
+        made.await
+            .map_err(|e| refused(e.to_string()))?
+            .map_err(refused)
+    }
+}
+
+/// Values of the grid from stored numbers, with what cannot be true masked as it was when they were attached.
+fn made(reading: &Reading, step: PlannedStep, stored: &[f64]) -> Result<Vec<f32>, String> {
+    let Reading {
+        axes,
+        mapping,
+        packing,
+        quantity,
+        ..
+    } = reading;
+    let plane = axes.iter().filter(|axis| is_plane(axis));
+    let cells: u64 = plane.map(|axis| axis.len).product();
+    let rows = mapping.file_rows.len() as u64;
+    if cells != stored.len() as u64 || rows > cells {
+        return Err(format!("{} values for {cells} cells", stored.len()));
+    }
+    let mut masked = MaskedCells::default();
+    let packing = Packing::from(packing);
+    let rows = 0..rows as u32;
+    let values = converted((axes, mapping), &packing, (step, rows), stored, &mut masked);
+    let decoded = DecodedBand {
+        values,
+        masked,
+        // They were looked at when the store was attached.
+        ends: Ends::default(),
+    };
+    Ok(FoundValues::nothing().band(decoded, *quantity).0)
+}

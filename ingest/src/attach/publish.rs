@@ -1,0 +1,206 @@
+//! A survey in, a version of the product out: steps read, references durable, then the manifest that names them.
+
+use std::collections::BTreeSet;
+
+use contract::event::RejectReason;
+use contract::grid::Grid;
+use contract::key::ObjectKey;
+use contract::manifest::{MANIFEST_SCHEMA, Manifest, Step};
+use contract::product::ProductId;
+use contract::quantity::Quantity;
+use storage::{StorageError, Store, domain, fields, manifests};
+
+use super::Attached;
+use super::steps::{self, Put, Read};
+use super::survey::Survey;
+use crate::commit;
+use crate::error::{IngestError, Rejection, Stop};
+use crate::pipeline::grids::without_values;
+
+/// Reads all steps and publishes them as the next version.
+pub(super) async fn publish(
+    store: &Store,
+    survey: Survey,
+    told: &(dyn Fn(usize, usize) + Send + Sync),
+) -> Result<Attached, Stop> {
+    let Survey {
+        mut plan,
+        attachment,
+        place,
+    } = survey;
+    let product = plan.target.product.clone();
+    // Before a value is read: what would be refused at the end is refused now.
+    if let Some(newest) = newest(store, &product).await? {
+        check_fits(
+            &newest,
+            plan.mapping.grid,
+            (plan.target.quantity, plan.target.synthetic),
+        )?;
+    }
+    let digest = store.put_attachment(&attachment).await;
+    let digest = digest.map_err(IngestError::storage("store where the values lie"))?;
+    let origin = format!("{place}/{}", attachment.array);
+    let put = Put {
+        store,
+        product: &product,
+        attachment: digest,
+        origin: &origin,
+    };
+    let wanted = plan.steps.clone();
+    let mut read = steps::read(&mut plan, put, &wanted, told).await?;
+    if read.steps.is_empty() {
+        return Err(without_values(&plan, read.masked).into());
+    }
+    read.steps.sort_by_key(|step| step.period);
+    // The way back, before anybody goes it: address, credentials and all that the attachment keeps.
+    let first = fields::read(store, &read.steps[0].field, &plan.mapping.grid).await;
+    first.map_err(IngestError::storage("read an attached step again"))?;
+    let quantity = match read.range {
+        Some(range) => plan.target.quantity.over(range),
+        None => Ok(plan.target.quantity),
+    };
+    let quantity = quantity
+        .map_err(|e| Rejection::new(RejectReason::NoVariable, "quantity", e.to_string()))?;
+    let next = Next {
+        product: &product,
+        title: &plan.target.title,
+        source: &plan.target.source,
+        quantity,
+        synthetic: plan.target.synthetic,
+        grid: plan.mapping.grid,
+    };
+    let (version, is_new) = next_version(store, &next, &read).await?;
+    Ok(Attached {
+        is_new,
+        place,
+        kind: attachment.kind,
+        snapshot: attachment.snapshot.clone(),
+        steps: version.steps.len(),
+        read: wanted.len(),
+        stored_bytes: stored_bytes(store, &version).await?,
+        version: version.id(),
+        assumptions: plan.assumptions,
+    })
+}
+
+/// What the version will say of itself.
+struct Next<'a> {
+    product: &'a ProductId,
+    title: &'a str,
+    source: &'a str,
+    quantity: Quantity,
+    synthetic: bool,
+    grid: Grid,
+}
+
+async fn newest(store: &Store, product: &ProductId) -> Result<Option<Manifest>, Stop> {
+    let newest = manifests::latest(store, product).await;
+    let newest = newest.map_err(IngestError::storage("read the newest manifest"))?;
+    let Some(newest) = newest else {
+        return Ok(None);
+    };
+    let attached = store.attached_to(&newest).await;
+    if attached
+        .map_err(IngestError::storage("read what it is attached to"))?
+        .is_none()
+    {
+        return Err(IngestError::Attach {
+            product: product.to_string(),
+            detail: "it is there, and its values were landed or computed here; attach as another product (--product)".to_owned(),
+        }
+        .into());
+    }
+    Ok(Some(newest))
+}
+
+fn check_fits(
+    newest: &Manifest,
+    grid: Grid,
+    (quantity, synthetic): (Quantity, bool),
+) -> Result<(), Stop> {
+    let differs = if !commit::is_same_grid(&newest.grid, &grid) {
+        "lies on another grid"
+    } else if newest.quantity.joined(quantity).is_none() {
+        "holds another quantity"
+    } else if newest.synthetic != synthetic {
+        "is measured where it is synthetic, or the other way round"
+    } else {
+        return Ok(());
+    };
+    Err(IngestError::Attach {
+        product: newest.product.to_string(),
+        detail: format!("it {differs}; attach as another product (--product)"),
+    }
+    .into())
+}
+
+/// Publishes the steps, unless the newest version has just these.
+async fn next_version(
+    store: &Store,
+    next: &Next<'_>,
+    read: &Read,
+) -> Result<(Manifest, bool), Stop> {
+    let mut pauses = commit::attempts();
+    loop {
+        let newest = newest(store, next.product).await?;
+        if let Some(newest) = &newest {
+            check_fits(newest, next.grid, (next.quantity, next.synthetic))?;
+            if is_same(newest, &read.steps) {
+                return Ok((newest.clone(), false));
+            }
+        }
+        let domain = domain::write(store, next.product, &read.domain).await;
+        let manifest = Manifest {
+            schema: MANIFEST_SCHEMA,
+            product: next.product.clone(),
+            number: newest.as_ref().map_or(1, |newest| newest.number + 1),
+            title: next.title.to_owned(),
+            quantity: next.quantity,
+            synthetic: next.synthetic,
+            source: next.source.to_owned(),
+            grid: newest.as_ref().map_or(next.grid, |newest| newest.grid),
+            steps: read.steps.clone(),
+            domain: domain.map_err(IngestError::storage("store the domain"))?,
+            series: vec![],
+            derived_from: None,
+            computed: None,
+            notices: vec![],
+        };
+        match manifests::commit(store, &manifest).await {
+            Ok(()) => {
+                cube::keep_up(store, &manifest).await;
+                return Ok((manifest, true));
+            }
+            Err(StorageError::Conflict { .. }) => {
+                commit::race_lost(next.product, &mut pauses).await?
+            }
+            Err(e) => return Err(IngestError::storage("publish a manifest")(e).into()),
+        }
+    }
+}
+
+fn is_same(newest: &Manifest, steps: &[Step]) -> bool {
+    newest.steps == steps
+}
+
+/// Bytes of what this store holds for a version.
+async fn stored_bytes(store: &Store, version: &Manifest) -> Result<u64, Stop> {
+    let bare = store.bare();
+    let mut keys: Vec<_> = version
+        .steps
+        .iter()
+        .map(|step| step.field.clone())
+        .collect();
+    let raw = version.steps.iter().map(|step| step.raw_sha256);
+    let raw: BTreeSet<_> = raw.collect();
+    keys.extend(raw.iter().map(|raw| ObjectKey::raw(&version.product, raw)));
+    keys.push(version.domain.clone());
+    keys.sort();
+    keys.dedup();
+    let mut bytes = 0;
+    for key in keys {
+        let size = bare.size_bytes(&key).await;
+        bytes += size.map_err(IngestError::storage("look at what was stored"))?;
+    }
+    Ok(bytes)
+}

@@ -1,0 +1,242 @@
+//! Arrays of a store of others in, what they say as a file says it, and their values.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+use std::sync::Arc;
+
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
+use contract::event::RejectReason;
+use cube::foreign::{Absent, ArrayKind, Foreign, ForeignArray, ForeignError};
+use serde_json::{Map, Value};
+
+use super::file::description::{
+    AttributeValue, Attributes, Description, Dimension, Kind, MAX_ATTRIBUTE_NUMBERS,
+    MAX_ATTRIBUTE_TEXT_BYTES, MAX_ATTRIBUTES, MAX_NAME_BYTES, Part, Variable,
+};
+use crate::error::{IngestError, Rejection, Stop};
+
+/// Which index is read of dimensions beside time and the map, by their names.
+pub(crate) type Indexes = BTreeMap<String, u64>;
+
+/// Arrays that are read.
+#[derive(Clone)]
+pub(crate) struct Arrays {
+    foreign: Arc<Foreign>,
+    indexes: Indexes,
+    /// The array that is asked for, and what its chunks mean that are not there.
+    absent: (String, Absent),
+    plane_cells: u64,
+}
+
+impl Arrays {
+    /// Arrays of a store; of dimensions that `indexes` name one index is read.
+    pub(crate) fn new(
+        foreign: Arc<Foreign>,
+        indexes: Indexes,
+        absent: (String, Absent),
+        plane_cells: u64,
+    ) -> Self {
+        Self {
+            foreign,
+            indexes,
+            absent,
+            plane_cells,
+        }
+    }
+
+    /// Values of a part of an array, as many as `expected`.
+    pub(crate) async fn read(
+        &self,
+        variable: &str,
+        part: &[Part],
+        expected: u64,
+    ) -> Result<Vec<f64>, Stop> {
+        if expected > self.plane_cells {
+            let detail = format!(
+                "{expected} values at once, at most {} are read",
+                self.plane_cells
+            );
+            return Err(Rejection::new(RejectReason::TooLarge, variable, detail).into());
+        }
+        self.values(variable, part).await.map_err(stopped)
+    }
+
+    /// The same with the error of the store.
+    pub(crate) async fn values(
+        &self,
+        variable: &str,
+        part: &[Part],
+    ) -> Result<Vec<f64>, ForeignError> {
+        let array = self.foreign.array(variable)?;
+        let mut parts = part.iter();
+        let mut ranges: Vec<Range<u64>> = vec![];
+        for (name, len) in &array.dimensions {
+            ranges.push(match self.index(array, name.as_deref()) {
+                Some(index) => index..index.saturating_add(1),
+                None => match parts.next() {
+                    Some(Part::At(index)) => *index..index.saturating_add(1),
+                    Some(Part::Some { first, count }) => *first..first.saturating_add(*count),
+                    Some(Part::All) | None => 0..*len,
+                },
+            });
+        }
+        let absent = if self.absent.0 == variable {
+            self.absent.1
+        } else {
+            Absent::Fill
+        };
+        self.foreign.read(variable, &ranges, absent).await
+    }
+
+    /// The index that is read of a dimension of an array; none of one that is its own coordinate, or not named.
+    fn index(&self, array: &ForeignArray, dimension: Option<&str>) -> Option<u64> {
+        index(&self.indexes, array, dimension)
+    }
+}
+
+fn index(indexes: &Indexes, array: &ForeignArray, dimension: Option<&str>) -> Option<u64> {
+    let dimension = dimension.filter(|name| *name != array.name)?;
+    indexes.get(dimension).copied()
+}
+
+/// What stops a file for what a store of others answers.
+pub(crate) fn stopped(error: ForeignError) -> Stop {
+    if error.is_retryable {
+        return IngestError::Foreign { source: error }.into();
+    }
+    Rejection::new(RejectReason::Unreadable, error.place, error.reason).into()
+}
+
+/// What a store says, without the dimensions of which one index is read.
+///
+/// # Errors
+/// There is no such dimension, or no such index.
+pub(crate) fn describe(foreign: &Foreign, indexes: &Indexes) -> Result<Description, Rejection> {
+    for (name, index) in indexes {
+        let all = foreign.arrays().flat_map(|array| &array.dimensions);
+        let lens: Vec<u64> = all
+            .filter(|(own, _)| own.as_ref() == Some(name))
+            .map(|(_, len)| *len)
+            .collect();
+        let detail = match lens.iter().min() {
+            None => "is no dimension of an array".to_owned(),
+            Some(len) if index >= len => format!("has the indexes 0 to {}", len.saturating_sub(1)),
+            Some(_) => continue,
+        };
+        return Err(Rejection::new(RejectReason::Grid, name, detail));
+    }
+    Ok(Description {
+        format: foreign.found.kind.to_string(),
+        attributes: attributes(&foreign.attributes, Kind::Other),
+        variables: foreign
+            .arrays()
+            .map(|array| variable(array, indexes))
+            .collect(),
+        library_bytes: 0,
+    })
+}
+
+fn variable(array: &ForeignArray, indexes: &Indexes) -> Variable {
+    let kind = match array.kind {
+        ArrayKind::Integer(bytes) => Kind::Integer(bytes),
+        ArrayKind::Unsigned(bytes) => Kind::Unsigned(bytes),
+        ArrayKind::Float(bytes) => Kind::Float(bytes),
+        ArrayKind::Other => Kind::Other,
+    };
+    let mut attributes = attributes(&array.attributes, kind);
+    // Zarr version 2 has it where version 3 has a value for what was not written, which may be one like any other.
+    if let (true, Some(fill)) = (array.is_zarr2, array.fill) {
+        let fill = AttributeValue::Numbers {
+            kind,
+            bits: vec![fill.into()],
+        };
+        attributes.0.entry("_FillValue".to_owned()).or_insert(fill);
+    }
+    let dimensions = array.dimensions.iter();
+    let own = dimensions.filter(|(name, _)| index(indexes, array, name.as_deref()).is_none());
+    Variable {
+        name: array.name.clone(),
+        dimensions: own
+            .map(|(name, len)| Dimension {
+                name: name.clone(),
+                len: *len,
+            })
+            .collect(),
+        kind,
+        attributes,
+    }
+}
+
+/// Attributes as a file has them. JSON does not tell types of numbers: one without a fraction is taken to be of the array's
+/// own type, as a number of what is stored, one with a fraction for a value.
+fn attributes(all: &Map<String, Value>, kind: Kind) -> Attributes {
+    let kept = all.iter().filter(|(name, _)| name.len() <= MAX_NAME_BYTES);
+    kept.take(MAX_ATTRIBUTES)
+        .filter_map(|(name, value)| Some((name.clone(), attribute(name, value, kind)?)))
+        .collect()
+}
+
+fn attribute(name: &str, value: &Value, kind: Kind) -> Option<AttributeValue> {
+    if let Value::String(text) = value {
+        return Some(match number_of_text(name, text, kind) {
+            Some(number) => AttributeValue::Numbers {
+                kind,
+                bits: vec![number.into()],
+            },
+            None => AttributeValue::Text(cut(text)),
+        });
+    }
+    let numbers: Vec<&Value> = match value {
+        Value::Array(all) => all.iter().take(MAX_ATTRIBUTE_NUMBERS).collect(),
+        Value::Number(_) | Value::Bool(_) => vec![value],
+        Value::Null | Value::Object(_) | Value::String(_) => return None,
+    };
+    let is_whole = numbers
+        .iter()
+        .all(|n| n.is_i64() || n.is_u64() || n.is_boolean());
+    let number = |value: &Value| match value {
+        Value::Bool(is_on) => Some(f64::from(u8::from(*is_on))),
+        Value::String(text) => not_finite(text),
+        value => value.as_f64(),
+    };
+    let bits: Option<Vec<_>> = numbers.iter().map(|n| number(n).map(Into::into)).collect();
+    Some(AttributeValue::Numbers {
+        kind: match kind {
+            Kind::Integer(_) | Kind::Unsigned(_) if is_whole => kind,
+            _ if is_whole => Kind::Integer(8),
+            _ => Kind::Float(8),
+        },
+        bits: bits.filter(|bits| !bits.is_empty())?,
+    })
+}
+
+/// A number that JSON cannot hold: by its name, or (as xarray writes fill values in Zarr version 3) in base 64.
+fn number_of_text(name: &str, text: &str, kind: Kind) -> Option<f64> {
+    let is_fill = matches!(name, "_FillValue" | "missing_value");
+    if !is_fill || !matches!(kind, Kind::Float(_)) {
+        return None;
+    }
+    let in_base_64 = || {
+        let bytes = STANDARD.decode(text).ok()?;
+        Some(f64::from_le_bytes(bytes.try_into().ok()?))
+    };
+    not_finite(text).or_else(in_base_64)
+}
+
+fn not_finite(text: &str) -> Option<f64> {
+    match text {
+        "NaN" => Some(f64::NAN),
+        "Infinity" => Some(f64::INFINITY),
+        "-Infinity" => Some(f64::NEG_INFINITY),
+        _ => None,
+    }
+}
+
+fn cut(text: &str) -> String {
+    let mut end = text.len().min(MAX_ATTRIBUTE_TEXT_BYTES);
+    while !text.is_char_boundary(end) {
+        end -= 1;
+    }
+    text[..end].to_owned()
+}

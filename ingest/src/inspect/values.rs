@@ -1,0 +1,35 @@
+//! Where values are asked for: the reader process of a file, or arrays of a store of others.
+
+use super::arrays::Arrays;
+use super::file::description::Part;
+use super::reader::session::Session;
+use crate::error::Stop;
+
+/// Whoever gives values of what was described.
+pub(crate) enum Values {
+    Process(Box<Session>),
+    Arrays(Arrays),
+}
+
+impl Values {
+    /// Values of a part of a variable, as many as `expected`, as float64.
+    pub(crate) async fn read(
+        &mut self,
+        variable: &str,
+        part: &[Part],
+        expected: u64,
+    ) -> Result<Vec<f64>, Stop> {
+        match self {
+            Self::Process(session) => session.read(variable, part, expected).await,
+            Self::Arrays(arrays) => arrays.read(variable, part, expected).await,
+        }
+    }
+
+    /// Memory of the reader beside the values that are asked for, bytes.
+    pub(crate) fn library_bytes(&self) -> u64 {
+        match self {
+            Self::Process(session) => session.library_bytes(),
+            Self::Arrays(_) => 0,
+        }
+    }
+}

@@ -1,0 +1,323 @@
+//! Objects of a store in, the same out, but for references, which are read as the fields that they refer to.
+
+use std::fmt::{Debug, Display, Formatter};
+use std::ops::Range;
+use std::sync::Arc;
+
+use async_trait::async_trait;
+use bytes::Bytes;
+use contract::digest::Digest;
+use contract::key::ObjectKey;
+use contract::kind::Kind;
+use contract::product::ProductId;
+use futures::stream::{self, BoxStream, StreamExt as _};
+use object_store::path::Path;
+use object_store::{
+    Attributes, CopyOptions, Error, GetOptions, GetResult, GetResultPayload, ListResult,
+    MultipartUpload, ObjectMeta, ObjectStore, ObjectStoreExt as _, PutMultipartOptions, PutOptions,
+    PutPayload, PutResult, Result,
+};
+use quick_cache::Weighter;
+use quick_cache::sync::Cache;
+
+use super::attachment::{Attachment, MAX_ATTACHMENT_BYTES};
+use super::reference::{MAX_REFERENCE_BYTES, Reference, named};
+use super::source::Source;
+use crate::failure::Failure;
+use crate::fields;
+use crate::off_thread::off_thread;
+use crate::parquet_table::shape_only;
+
+/// Fields that were read from elsewhere and are kept, bytes of them as fields.
+const KEPT_BYTES: u64 = 256 << 20;
+/// Fields that are known to be here, by name.
+const KNOWN_FIELDS: usize = 1 << 16;
+/// Attachments that are kept.
+const KEPT_ATTACHMENTS: usize = 64;
+/// The layer in errors.
+const NAME: &str = "attached store";
+
+/// What is kept of other stores, for all paths to the same objects.
+pub(super) struct Held {
+    source: Arc<dyn Source>,
+    /// By the digest of their values, the bytes that a field of them would be.
+    fields: Cache<Digest, Bytes, BySize>,
+    /// Paths where fields themselves are.
+    here: Cache<String, ()>,
+    attachments: Cache<(ProductId, Digest), Arc<Attachment>>,
+}
+
+#[derive(Clone)]
+struct BySize;
+
+impl Weighter<Digest, Bytes> for BySize {
+    fn weight(&self, _key: &Digest, content: &Bytes) -> u64 {
+        content.len() as u64
+    }
+}
+
+impl Held {
+    pub(super) fn new(source: Arc<dyn Source>) -> Self {
+        Self {
+            source,
+            fields: Cache::with_weighter(KNOWN_FIELDS, KEPT_BYTES, BySize),
+            here: Cache::new(KNOWN_FIELDS),
+            attachments: Cache::new(KEPT_ATTACHMENTS),
+        }
+    }
+}
+
+/// The layer over what is stored.
+pub(super) struct Layer {
+    inner: Arc<dyn ObjectStore>,
+    held: Arc<Held>,
+}
+
+/// A path that may have a reference in its place.
+struct Place {
+    key: ObjectKey,
+    product: ProductId,
+    digest: Digest,
+    /// What stands before the key.
+    before: String,
+}
+
+/// The field that a path may be of.
+fn place(at: &Path) -> Option<Place> {
+    let path = at.as_ref();
+    let folder = format!("{}/", Kind::Field.folder());
+    let start = path
+        .rfind(&format!("/{folder}"))
+        .map_or(0, |slash| slash + 1);
+    let key: ObjectKey = path.get(start..)?.parse().ok()?;
+    let (product, digest) = named(&key)?;
+    let before = path[..start].to_owned();
+    Some(Place {
+        key,
+        product,
+        digest,
+        before,
+    })
+}
+
+fn failed(failure: impl Into<Box<dyn std::error::Error + Send + Sync>>) -> Error {
+    Error::Generic {
+        store: NAME,
+        source: failure.into(),
+    }
+}
+
+impl Layer {
+    pub(super) fn new(inner: Arc<dyn ObjectStore>, held: Arc<Held>) -> Self {
+        Self { inner, held }
+    }
+
+    /// The reference at a path; none if something else is there.
+    async fn reference(&self, at: &Path, place: &Place) -> Result<Option<(ObjectMeta, Reference)>> {
+        let found = self.inner.get(at).await?;
+        let meta = found.meta.clone();
+        if meta.size > MAX_REFERENCE_BYTES {
+            self.held.here.insert(at.to_string(), ());
+            return Ok(None);
+        }
+        let content = found.bytes().await?;
+        let reference = Reference::of_bytes(&place.key, &content);
+        let reference = reference.map_err(|e| {
+            let (place, reason) = (place.key.to_string(), e.to_string());
+            failed(Failure {
+                place,
+                reason,
+                is_retryable: false,
+            })
+        })?;
+        if reference.is_none() {
+            self.held.here.insert(at.to_string(), ());
+        }
+        Ok(reference.map(|reference| (meta, reference)))
+    }
+
+    /// The bytes of the field that a reference refers to.
+    async fn content(&self, place: &Place, reference: Reference) -> Result<Bytes> {
+        let read = self.read(place, reference);
+        self.held
+            .fields
+            .get_or_insert_async(&place.digest, read)
+            .await
+    }
+
+    async fn read(&self, place: &Place, reference: Reference) -> Result<Bytes> {
+        let attachment = self.attachment(place, reference.attachment).await?;
+        let values = self.held.source.values(&attachment, &reference).await;
+        let values = values.map_err(failed)?;
+        let (digest, grid) = (place.digest, shape_only(reference.rows, reference.cols));
+        let period = reference.period;
+        let encoded = off_thread(move || {
+            if values.len() != grid.cell_count() {
+                return Ok(None);
+            }
+            let encoded = fields::encode(&grid, &values, period)?;
+            Ok((encoded.values_sha256 == digest).then_some(encoded.content))
+        });
+        let encoded = encoded.await.map_err(|e| failed(Box::new(e)))?;
+        encoded.ok_or_else(|| {
+            failed(Failure {
+                place: format!("{} step {period}", attachment.place()),
+                reason: format!(
+                    "the store has changed since it was attached: run `fluxglobe attach --refresh {}`",
+                    place.product
+                ),
+                is_retryable: false,
+            })
+        })
+    }
+
+    async fn attachment(&self, place: &Place, digest: Digest) -> Result<Arc<Attachment>> {
+        let name = (place.product.clone(), digest);
+        let read = async {
+            let key = ObjectKey::raw(&place.product, &digest);
+            let path = Path::from(format!("{}{key}", place.before));
+            let found = self.inner.get(&path).await?;
+            let broken = |reason: String| {
+                failed(Failure {
+                    place: key.to_string(),
+                    reason,
+                    is_retryable: false,
+                })
+            };
+            if found.meta.size > MAX_ATTACHMENT_BYTES {
+                return Err(broken("it is damaged: it is too large".to_owned()));
+            }
+            let content = found.bytes().await?;
+            if Digest::of(&content) != digest {
+                return Err(broken("it is damaged: its name is another".to_owned()));
+            }
+            let read = Attachment::of_bytes(&key, &content);
+            read.map(Arc::new).map_err(|e| broken(e.to_string()))
+        };
+        self.held.attachments.get_or_insert_async(&name, read).await
+    }
+
+    /// The field at a path and what is known of its object, if a reference is there.
+    async fn attached(&self, at: &Path) -> Result<Option<(ObjectMeta, Bytes)>> {
+        let Some(place) = place(at) else {
+            return Ok(None);
+        };
+        if self.held.here.get(at.as_ref()).is_some() {
+            return Ok(None);
+        }
+        let Some((mut meta, reference)) = self.reference(at, &place).await? else {
+            return Ok(None);
+        };
+        let content = self.content(&place, reference).await?;
+        meta.size = content.len() as u64;
+        Ok(Some((meta, content)))
+    }
+}
+
+/// The part of a field that is asked for.
+fn answer(meta: ObjectMeta, content: &Bytes, options: &GetOptions) -> Result<GetResult> {
+    options.check_preconditions(&meta)?;
+    let whole = 0..meta.size;
+    let range = match &options.range {
+        Some(range) => range.as_range(meta.size).map_err(|e| failed(Box::new(e)))?,
+        None => whole,
+    };
+    let part = if options.head {
+        Bytes::new()
+    } else {
+        content.slice(range.start as usize..range.end as usize)
+    };
+    Ok(GetResult {
+        payload: GetResultPayload::Stream(stream::once(async { Ok(part) }).boxed()),
+        meta,
+        range,
+        attributes: Attributes::default(),
+    })
+}
+
+impl Debug for Layer {
+    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
+        Display::fmt(self, f)
+    }
+}
+
+impl Display for Layer {
+    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}, with attached stores", self.inner)
+    }
+}
+
+#[async_trait]
+impl ObjectStore for Layer {
+    async fn put_opts(&self, at: &Path, what: PutPayload, o: PutOptions) -> Result<PutResult> {
+        self.inner.put_opts(at, what, o).await
+    }
+
+    async fn put_multipart_opts(
+        &self,
+        at: &Path,
+        o: PutMultipartOptions,
+    ) -> Result<Box<dyn MultipartUpload>> {
+        self.inner.put_multipart_opts(at, o).await
+    }
+
+    /// Fields that are here cost no request more: only what is as small as a reference is looked into.
+    async fn get_opts(&self, at: &Path, o: GetOptions) -> Result<GetResult> {
+        if place(at).is_none() || self.held.here.get(at.as_ref()).is_some() {
+            return self.inner.get_opts(at, o).await;
+        }
+        let first = self.inner.get_opts(at, o.clone()).await;
+        match &first {
+            Ok(found) if found.meta.size > MAX_REFERENCE_BYTES => {
+                self.held.here.insert(at.to_string(), ());
+                return first;
+            }
+            // A part that lies behind the end of a reference.
+            Err(_) if o.range.is_none() => return first,
+            Err(Error::NotFound { .. }) => return first,
+            Ok(_) | Err(_) => {}
+        }
+        match self.attached(at).await? {
+            Some((meta, content)) => answer(meta, &content, &o),
+            None => first,
+        }
+    }
+
+    async fn get_ranges(&self, at: &Path, ranges: &[Range<u64>]) -> Result<Vec<Bytes>> {
+        let Some((_meta, content)) = self.attached(at).await? else {
+            return self.inner.get_ranges(at, ranges).await;
+        };
+        let part = |range: &Range<u64>| {
+            let is_inside = range.start <= range.end && range.end <= content.len() as u64;
+            let beyond = || {
+                failed(format!(
+                    "bytes {range:?} of {} were asked for",
+                    content.len()
+                ))
+            };
+            is_inside
+                .then(|| content.slice(range.start as usize..range.end as usize))
+                .ok_or_else(beyond)
+        };
+        ranges.iter().map(part).collect()
+    }
+
+    fn delete_stream(
+        &self,
+        at: BoxStream<'static, Result<Path>>,
+    ) -> BoxStream<'static, Result<Path>> {
+        self.inner.delete_stream(at)
+    }
+
+    fn list(&self, prefix: Option<&Path>) -> BoxStream<'static, Result<ObjectMeta>> {
+        self.inner.list(prefix)
+    }
+
+    async fn list_with_delimiter(&self, prefix: Option<&Path>) -> Result<ListResult> {
+        self.inner.list_with_delimiter(prefix).await
+    }
+
+    async fn copy_opts(&self, from: &Path, to: &Path, o: CopyOptions) -> Result<()> {
+        self.inner.copy_opts(from, to, o).await
+    }
+}

@@ -1,0 +1,20 @@
+//! What reads steps from stores of others.
+
+use std::sync::Arc;
+
+use async_trait::async_trait;
+
+use super::attachment::Attachment;
+use super::reference::Reference;
+use crate::failure::Failure;
+
+/// Reads steps from stores of others.
+#[async_trait]
+pub trait Source: std::fmt::Debug + Send + Sync {
+    /// The values of a step, `[row, col]`, stored unit, NaN no data.
+    async fn values(
+        &self,
+        attachment: &Arc<Attachment>,
+        reference: &Reference,
+    ) -> Result<Vec<f32>, Failure>;
+}
