@@ -145,6 +145,7 @@ fn level_shape(level: &Level, name: &str, steps: u64) -> (Shape, Option<Vec<u64>
         name: format!("{}/{name}", level_group(level)),
         cells: vec![steps, grid.rows.into(), grid.cols.into()],
         chunk: along_time(layout.object),
+        zstd_level: ZSTD_LEVEL,
         dimensions: &["time", "lat", "lon"],
     };
     let inner = layout.is_sharded().then(|| along_time(layout.chunk));
@@ -157,6 +158,7 @@ pub(crate) fn level_names(steps: usize) -> Result<Definition, CubeError> {
         name: format!("{LEVELS}/steps_sha256"),
         cells: vec![steps as u64, DIGEST_BYTES],
         chunk: vec![DIGEST_CHUNK, DIGEST_BYTES],
+        zstd_level: ZSTD_LEVEL,
         dimensions: &["time", "sha256_byte"],
     };
     define(&shape, uint8(), 0u8.into(), cf::of_level_names(), None)
@@ -168,6 +170,7 @@ pub(crate) fn level_ranges(steps: usize) -> Result<Definition, CubeError> {
         name: format!("{LEVELS}/range"),
         cells: vec![steps as u64, 2],
         chunk: vec![TIME_CHUNK, 2],
+        zstd_level: ZSTD_LEVEL,
         dimensions: &["time", "least_most"],
     };
     define(&shape, float32(), 0f32.into(), cf::of_ranges(), None)

@@ -172,7 +172,7 @@ async fn next_version(
                 return Ok((manifest, true));
             }
             Err(StorageError::Conflict { .. }) => {
-                commit::race_lost(next.product, &mut pauses).await?
+                commit::race_lost(next.product, &mut pauses).await?;
             }
             Err(e) => return Err(IngestError::storage("publish a manifest")(e).into()),
         }
