@@ -298,18 +298,29 @@ mod tests {
             };
             let values: Vec<f32> = (0..grid.cell_count()).map(value).collect();
             let period = Period::month(2000, month).unwrap();
-            steps.push(fields::write(&store, &product, &grid, &values, period).await.unwrap());
+            steps.push(
+                fields::write(&store, &product, &grid, &values, period)
+                    .await
+                    .unwrap(),
+            );
         }
         let mut lost = Cells::none(grid.cell_count());
         lost.add_valued(90_300, &[5.0]);
         let size_bytes = store.size_bytes(&steps[1]).await.unwrap();
         let (counted, traffic) = store.counted();
         let mut rest = lost.clone();
-        look_for(&counted, &grid, steps[1..].iter(), &mut rest).await.unwrap();
+        look_for(&counted, &grid, steps[1..].iter(), &mut rest)
+            .await
+            .unwrap();
         assert_eq!(rest, lost, "nobody holds it");
         let read_bytes = traffic.counts().read_bytes;
-        assert!(read_bytes < size_bytes, "{read_bytes} of three times {size_bytes}");
-        look_for(&store, &grid, steps.iter(), &mut rest).await.unwrap();
+        assert!(
+            read_bytes < size_bytes,
+            "{read_bytes} of three times {size_bytes}"
+        );
+        look_for(&store, &grid, steps.iter(), &mut rest)
+            .await
+            .unwrap();
         assert!(!rest.is_any());
     }
 
