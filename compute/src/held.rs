@@ -34,6 +34,9 @@ mod tests {
         let refused = check_cells(648_000_000, "accumulating").unwrap_err();
         assert!(matches!(refused, ComputeError::Expression { .. }));
         let text = refused.to_string();
-        assert!(text.contains("accumulating needs all 648000000 cells"), "{text}");
+        assert!(
+            text.contains("accumulating needs all 648000000 cells"),
+            "{text}"
+        );
     }
 }

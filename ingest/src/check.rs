@@ -142,7 +142,10 @@ mod tests {
             let counts = (found.masked.implausible, found.masked.out_of_range);
             assert_eq!(counts, (2, 3), "two, and those masked before");
             assert!([0, 1, 99].iter().all(|at| checked[*at].is_nan()));
-            assert_eq!(found.range().map(f64::to_bits), [0.25, 0.5].map(f64::to_bits));
+            assert_eq!(
+                found.range().map(f64::to_bits),
+                [0.25, 0.5].map(f64::to_bits)
+            );
         }
         assert_eq!(check(&[0.0, 1.0], 2).unwrap().0.valid_cells, 2);
     }

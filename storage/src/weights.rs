@@ -177,8 +177,20 @@ mod tests {
     #[test]
     fn equal_areas_are_held_once_and_read_as_what_they_are() {
         let key = ObjectKey::weights(&contract::digest::Digest::of(b"job"));
-        let (sea, coast) = (vec![0.25; 7200], (0..7200).map(f64::from).collect::<Vec<_>>());
-        let chunk = |n: u32| (n, if n % 5 == 3 { coast.clone() } else { sea.clone() });
+        let (sea, coast) = (
+            vec![0.25; 7200],
+            (0..7200).map(f64::from).collect::<Vec<_>>(),
+        );
+        let chunk = |n: u32| {
+            (
+                n,
+                if n % 5 == 3 {
+                    coast.clone()
+                } else {
+                    sea.clone()
+                },
+            )
+        };
         let chunks: Vec<_> = (0..200).map(chunk).collect();
         let content = encode(&chunks).unwrap();
         let shared = decode_shared(&key, content.clone()).unwrap();

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use contract::chunk::{BAND_CELLS, Window};
 use contract::grid::Grid;
 use contract::key::ObjectKey;
 use contract::manifest::{Manifest, Step};
@@ -19,7 +20,7 @@ pub(crate) const FIELDS_AT_ONCE: usize = 2;
 /// Writes the domain of steps that follow the newest version.
 ///
 /// What was dropped or revised may have held the only value of a cell: of such cells other steps are looked at until each was
-/// found in one, which most are in the first.
+/// found in one, which most are in the first; no further than the window that the rest lie in.
 pub(super) async fn write(
     store: &Store,
     product: &ProductId,
@@ -71,15 +72,8 @@ pub(super) async fn write(
     })
     .await?;
     if lost.is_any() {
-        let mut kept: Vec<ObjectKey> = vec![];
-        for step in steps.iter().rev().filter(|step| own.contains(&step.field)) {
-            kept.push(step.field.clone());
-        }
-        each(store, grid, kept, |first, values| {
-            lost.remove_valued(first, values);
-            lost.is_any()
-        })
-        .await?;
+        let kept = steps.iter().rev().filter(|step| own.contains(&step.field));
+        look_for(store, grid, kept.map(|step| &step.field), &mut lost).await?;
         cells.remove(&lost);
     }
     match newest {
@@ -137,6 +131,66 @@ async fn each(
         }
     }
     Ok(())
+}
+
+/// Takes cells away that hold data in some of these fields; of each no more is read than the window that the rest lie in.
+async fn look_for<'a>(
+    store: &Store,
+    grid: &Grid,
+    fields: impl Iterator<Item = &'a ObjectKey>,
+    lost: &mut Cells,
+) -> Result<(), IngestError> {
+    let failed = || IngestError::storage("read a field");
+    let mut all = Window {
+        row: 0,
+        col: 0,
+        rows: grid.rows,
+        cols: grid.cols,
+    };
+    for field in fields {
+        let Some(window) = around(lost, grid, all) else {
+            return Ok(());
+        };
+        all = window;
+        let reader = Reader::open(store, field, Some(grid));
+        let reader = reader.await.map_err(failed())?;
+        let rows_at_once = (BAND_CELLS / u64::from(window.cols)).max(1) as u32;
+        let mut left = window;
+        while left.rows > 0 {
+            let rows = left.rows.min(rows_at_once);
+            let values = reader.window(Window { rows, ..left }).await;
+            let values = values.map_err(failed())?;
+            for (row, values) in (left.row..).zip(values.chunks(window.cols as usize)) {
+                let first = row as usize * grid.cols as usize + window.col as usize;
+                lost.remove_valued(first, values);
+            }
+            left.row += rows;
+            left.rows -= rows;
+        }
+    }
+    Ok(())
+}
+
+/// The smallest window that holds those of some cells that lie in another one; none without any.
+fn around(cells: &Cells, grid: &Grid, all: Window) -> Option<Window> {
+    let rows = all.row..all.row + all.rows;
+    let has = |row: u32, col: u32| cells.has(row as usize * grid.cols as usize + col as usize);
+    let (mut north, mut south, mut west, mut east) = (u32::MAX, 0, u32::MAX, 0);
+    for row in rows {
+        let mut cols = all.col..all.col + all.cols;
+        let Some(first) = cols.find(|col| has(row, *col)) else {
+            continue;
+        };
+        let last = cols.rev().find(|col| has(row, *col)).unwrap_or(first);
+        (north, south) = (north.min(row), row);
+        (west, east) = (west.min(first), east.max(last));
+    }
+    (north <= south).then(|| Window {
+        row: north,
+        col: west,
+        rows: south - north + 1,
+        cols: east - west + 1,
+    })
 }
 
 #[cfg(test)]
@@ -198,6 +252,76 @@ mod tests {
         let found = found.unwrap();
         assert_eq!(found, anew, "it is that of a product that has no past");
         domain::read(store, &found).await.unwrap()
+    }
+
+    #[test]
+    fn cells_lie_in_a_window_around_them() {
+        let grid = Grid {
+            rows: 5,
+            cols: 7,
+            ..GRID
+        };
+        let all = Window {
+            row: 0,
+            col: 0,
+            rows: 5,
+            cols: 7,
+        };
+        let mut cells = Cells::none(35);
+        assert_eq!(around(&cells, &grid, all), None);
+        for (row, col) in [(1, 4), (3, 2)] {
+            cells.add_valued(row * 7 + col, &[1.0]);
+        }
+        let found = around(&cells, &grid, all).unwrap();
+        let corners = (found.row, found.col, found.rows, found.cols);
+        assert_eq!(corners, (1, 2, 3, 3));
+        cells.remove_valued(3 * 7 + 2, &[1.0]);
+        let found = around(&cells, &grid, found).unwrap();
+        assert_eq!((found.row, found.col, found.rows, found.cols), (1, 4, 1, 1));
+    }
+
+    #[tokio::test]
+    async fn of_steps_that_are_looked_through_only_the_window_of_lost_cells_is_read() {
+        let (store, product) = (Store::memory(), "p".parse::<ProductId>().unwrap());
+        let grid = Grid {
+            rows: 600,
+            cols: 600,
+            ..GRID
+        };
+        // Only the first step, at one cell, has what the revision takes away; the others have nothing there.
+        let mut steps = vec![];
+        for month in 1..=4 {
+            let value = |i: usize| match (i, month) {
+                (90_300, 1) => 5.0,
+                (90_300, _) => f32::NAN,
+                _ => (i * month as usize).wrapping_mul(2_654_435_761) as f32,
+            };
+            let values: Vec<f32> = (0..grid.cell_count()).map(value).collect();
+            let period = Period::month(2000, month).unwrap();
+            steps.push(
+                fields::write(&store, &product, &grid, &values, period)
+                    .await
+                    .unwrap(),
+            );
+        }
+        let mut lost = Cells::none(grid.cell_count());
+        lost.add_valued(90_300, &[5.0]);
+        let size_bytes = store.size_bytes(&steps[1]).await.unwrap();
+        let (counted, traffic) = store.counted();
+        let mut rest = lost.clone();
+        look_for(&counted, &grid, steps[1..].iter(), &mut rest)
+            .await
+            .unwrap();
+        assert_eq!(rest, lost, "nobody holds it");
+        let read_bytes = traffic.counts().read_bytes;
+        assert!(
+            read_bytes < size_bytes,
+            "{read_bytes} of three times {size_bytes}"
+        );
+        look_for(&store, &grid, steps.iter(), &mut rest)
+            .await
+            .unwrap();
+        assert!(!rest.is_any());
     }
 
     #[tokio::test]

@@ -42,7 +42,8 @@ pub struct ServiceSettings {
         value_name = "URL"
     )]
     pub allow_store: Vec<String>,
-    /// Folder for files from the network while they are worked on; made if absent, emptied of what a killed process left.
+    /// Folder for files from the network while they are worked on, and for fields too large to be held while they are written; made if absent, emptied of
+    /// what a killed process left.
     #[arg(
         long,
         env = "FLUXGLOBE_SPOOL",

@@ -5,8 +5,8 @@
 
 mod attributes;
 mod axes;
-mod bands;
 mod bad_input;
+mod bands;
 mod cf_files;
 mod cleaned;
 mod contained;
