@@ -155,7 +155,12 @@ impl Levels {
         let ranges: Vec<f32> = ranges.collect();
         let array = arrays::level_ranges(after.len())?;
         axis::write_numbers(store, &array, (&ranges, 2), first).await?;
-        let first_step = if self.is_there { first_step } else { 0 };
+        // Who changed steps and knew of no levels left their times as they were.
+        let first_step = if self.is_there {
+            first_step.min(first)
+        } else {
+            0
+        };
         let steps = after.len();
         let own = arrays::axis(description.quantity, steps as u64)?;
         for level in level::levels(&description.grid) {

@@ -43,13 +43,7 @@ impl Steps {
     ) -> Result<LevelWindow, DrawError> {
         let mut parts = vec![];
         for window in choice.windows() {
-            let found = match self.in_cube(grid, field).await? {
-                Some((cube, step)) => {
-                    let found = cube.window_at(choice.level, window, step).await;
-                    found.map_err(|e| failed(field, e))?
-                }
-                None => None,
-            };
+            let found = self.of_cube(grid, field, (choice.level, window)).await?;
             let part = if let Some(part) = found {
                 part
             } else {
@@ -58,6 +52,30 @@ impl Steps {
             parts.push((window.cols as usize, part));
         }
         Ok(side_by_side(parts))
+    }
+
+    /// A window of a level of a field from the product's cube, if it is there.
+    async fn of_cube(
+        &self,
+        grid: &Grid,
+        field: &ObjectKey,
+        (level, window): (u32, Window),
+    ) -> Result<Option<LevelWindow>, DrawError> {
+        let Some((cube, step)) = self.in_cube(grid, field).await? else {
+            return Ok(None);
+        };
+        match cube.window_at(level, window, step).await {
+            Ok(found) => Ok(found),
+            // Clean-up may have taken what names the chunks of a state that was opened long ago: the newest names them too.
+            Err(first) => {
+                self.cubes.remove(product_of(field));
+                let Some((cube, step)) = self.in_cube(grid, field).await? else {
+                    return Err(failed(field, first));
+                };
+                let again = cube.window_at(level, window, step).await;
+                again.map_err(|e| failed(field, e))
+            }
+        }
     }
 
     /// The same of a field that is in no cube, or has no levels there.
