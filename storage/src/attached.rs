@@ -132,6 +132,3 @@ impl Store {
         Ok(None)
     }
 }
-
-#[cfg(test)]
-mod tests;

@@ -1,10 +1,16 @@
+//! References in the place of fields: what comes out is the field that they refer to, or an error.
+
+use std::sync::Arc;
+
 use async_trait::async_trait;
+use bytes::Bytes;
 use contract::grid::Grid;
+use contract::key::ObjectKey;
+use contract::kind::Vouched;
 use contract::time::Period;
 use object_store::path::Path;
-
-use super::*;
-use crate::fields;
+use storage::attached::{Attachment, Failure, Reference, Source, StoreKind};
+use storage::{Store, fields};
 
 const GRID: Grid = Grid {
     rows: 2,
@@ -60,8 +66,9 @@ async fn whoever_asks_gets_the_bytes_of_the_field() {
     // A reader that has not asked for the size before, of a part that lies behind the end of the reference.
     let anew = store.with_attached(Arc::new(Fixed(values())));
     let path = Path::from(key.as_str());
-    let parts = anew.object_store().get_ranges(&path, &[0..4, end - 4..end]);
-    assert_eq!(parts.await.unwrap(), ["PAR1", "PAR1"]);
+    let (objects, ends) = (anew.object_store(), [0..4, end - 4..end]);
+    let parts = objects.get_ranges(&path, &ends).await.unwrap();
+    assert_eq!(parts, ["PAR1", "PAR1"]);
     let read = fields::read(&layered, &key, &GRID).await.unwrap();
     assert!(
         read.iter()
@@ -101,12 +108,10 @@ async fn other_values_than_those_of_the_name_never_come_out() {
 async fn a_reference_that_moves_keeps_its_name_and_a_field_is_never_replaced() {
     let (store, key, field) = attached().await;
     let before = store.reference(&key).await.unwrap().unwrap();
-    let moved = Reference {
-        time_index: 8,
-        ..before
-    };
+    let own = (8, before.period);
+    let moved = Reference::new(before.attachment, own, [2, 3], [1.0, 0.0]);
     let product = "p".parse().unwrap();
-    let contract::kind::Vouched::Values(digest) = key.vouches() else {
+    let Vouched::Values(digest) = key.vouches() else {
         panic!("{key} is named by its values");
     };
     store
@@ -120,5 +125,5 @@ async fn a_reference_that_moves_keeps_its_name_and_a_field_is_never_replaced() {
         .put_reference(&product, &digest, &before)
         .await
         .unwrap();
-    assert_eq!(store.fetch(&key).await.unwrap(), field);
+    assert_eq!(store.get(&key).await.unwrap(), field);
 }
