@@ -97,7 +97,7 @@ impl Description {
     ///
     /// # Errors
     /// `Foreign` if they are not those of a cube, are of a layout to come, or describe no valid grid.
-    fn read(attributes: &Map<String, Value>, place: &str) -> Result<Self, CubeError> {
+    pub fn read(attributes: &Map<String, Value>, place: &str) -> Result<Self, CubeError> {
         let foreign = |reason: String| CubeError::Foreign {
             place: place.to_owned(),
             array: "the group".to_owned(),

@@ -15,5 +15,5 @@ mod read_only;
 
 pub use array::{Absent, ArrayKind, ForeignArray};
 pub use error::ForeignError;
-pub use hierarchy::{Foreign, Found};
+pub use hierarchy::{Changed, Foreign, Found};
 pub use objects::{Objects, StoredObjects};

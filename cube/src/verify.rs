@@ -302,6 +302,10 @@ pub fn mend<'a>(
         let Some(newest) = manifests::latest(store, product).await? else {
             return Ok(false);
         };
+        // It has no cube, and what there may be of before is nothing's of now.
+        if store.attached_to(&newest).await?.is_some() {
+            return Ok(false);
+        }
         // Of a newer version than there is: somebody took the newest manifest away.
         if is_whole
             && let Ok(followed) = crate::follow(store, &newest).await

@@ -24,8 +24,9 @@ use crate::{StorageError, Store};
 use layer::{Held, Layer};
 use reference::MAX_REFERENCE_BYTES;
 
+pub use crate::attached_mark::is_attached;
 pub use crate::failure::Failure;
-pub use attachment::{Attachment, StoreKind, is_attached};
+pub use attachment::{Attachment, StoreKind};
 pub use reference::Reference;
 pub use source::Source;
 
@@ -132,6 +133,3 @@ impl Store {
         Ok(None)
     }
 }
-
-#[cfg(test)]
-mod tests;

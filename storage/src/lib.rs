@@ -5,6 +5,7 @@
 //! purpose: what the values mean (contract) and what is done with them (the services).
 
 pub mod attached;
+mod attached_mark;
 pub mod content;
 pub mod contributed;
 pub mod document;

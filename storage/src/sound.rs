@@ -19,6 +19,7 @@ use contract::kind::{Kind, Vouched};
 use serde::Deserialize;
 
 use crate::StorageError;
+use crate::attached_mark::is_attached;
 use crate::content::{Content, PIECE_BYTES};
 use crate::off_thread::off_thread;
 use seal::{PARQUET_END_BYTES, Seal, SealCheck};
@@ -65,6 +66,11 @@ pub(crate) fn of_bytes(key: &ObjectKey, content: &[u8]) -> Result<Soundness, Sto
             } else {
                 damaged(&format!("its digest is {found}"))
             };
+        }
+        (Vouched::Values(_), _) if is_attached(content) => {
+            return damaged(
+                "it is attached to a store of others, and whoever reads it here does not read there",
+            );
         }
         (Vouched::Values(_), _) => (seal::of_parquet(content), true),
         (Vouched::Nothing, Some(Kind::Weights | Kind::Accumulating)) => {

@@ -55,10 +55,36 @@ impl Cubes {
         match self.open.get_or_insert_async(&name, opening).await {
             Ok(keys) => Ok(keys),
             Err(CubeError::Missing { .. } | CubeError::NoVersion { .. }) => {
-                Err(ServerError::UnknownVersion { manifest: name })
+                Err(self.without_cube(product, number, name).await?)
             }
             Err(error) => Err(failed(error)),
         }
+    }
+
+    /// Why a version has no cube.
+    async fn without_cube(
+        &self,
+        product: &ProductId,
+        number: u64,
+        name: String,
+    ) -> Result<ServerError, ServerError> {
+        let version = storage::manifests::numbered(&self.store, product, number).await?;
+        let attached = match &version {
+            Some(version) => self.store.attached_to(version).await?,
+            None => None,
+        };
+        Ok(match attached {
+            Some(attachment) => ServerError::Attached {
+                name,
+                // A folder is of no use to who asks, and none of their business.
+                place: if attachment.store.contains("://") {
+                    format!("read it there, at {}", attachment.store)
+                } else {
+                    "it is not given out here".to_owned()
+                },
+            },
+            None => ServerError::UnknownVersion { manifest: name },
+        })
     }
 
     /// The value of a key of a version that is open, or a part of it; none if there is no such key.

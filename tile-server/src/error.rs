@@ -52,6 +52,9 @@ pub enum ServerError {
         "there is no version {manifest:?}, or it is kept no more; /api/products names the newest ones"
     )]
     UnknownVersion { manifest: String },
+    /// A product whose values lie in a store of others.
+    #[error("{name} is attached to a store of others, which holds its values: {place}")]
+    Attached { name: String, place: String },
     /// No such way of drawing the product.
     #[error("product {product} has no layer {mode:?}; it has {offered}")]
     UnknownMode {
@@ -141,6 +144,7 @@ impl ServerError {
             Self::UnknownProduct { .. }
             | Self::EmptyProduct { .. }
             | Self::UnknownVersion { .. }
+            | Self::Attached { .. }
             | Self::UnknownMode { .. }
             | Self::UnknownAddress
             | Self::NoObservations => StatusCode::NOT_FOUND,

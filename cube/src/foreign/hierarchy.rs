@@ -1,6 +1,6 @@
 //! A store of others: what kind it is, its group and the arrays in it.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -47,7 +47,13 @@ pub struct Foreign {
     arrays: BTreeMap<String, Result<ForeignArray, ForeignError>>,
     chunks: Chunks,
     place: String,
+    /// Of a repository: tells what changed between its states.
+    repository: Option<icechunk::Repository>,
 }
+
+/// Chunks of an array that differ between two states of a repository, by their indexes.
+#[derive(Debug)]
+pub struct Changed(BTreeSet<Vec<u64>>);
 
 /// Which arrays of a store to open.
 enum Wanted<'a> {
@@ -105,13 +111,15 @@ impl Foreign {
         let place = objects.place();
         match found.kind {
             StoreKind::Icechunk => {
-                let (store, found) = repository(objects, found).await?;
+                let (repository, store, found) = repository(objects, found).await?;
                 let names = store.list_dir(&StorePrefix::root()).await;
                 let names = names.map_err(|e| ForeignError::refused(&place, first_lines(&e)))?;
                 let names = names.prefixes().iter();
                 let names = names.map(|name| name.as_str().trim_end_matches('/').to_owned());
                 let wanted = Wanted::All(names.collect());
-                Self::of((Arc::new(store), found), place, wanted).await
+                let mut own = Self::of((Arc::new(store), found), place, wanted).await?;
+                own.repository = Some(repository);
+                Ok(own)
             }
             StoreKind::Zarr2 | StoreKind::Zarr3 => {
                 let documents = documents(&objects, found.kind).await?;
@@ -143,7 +151,7 @@ impl Foreign {
         let place = objects.place();
         let (store, found): (Arrays, Found) = match found.kind {
             StoreKind::Icechunk => {
-                let (store, found) = repository(objects, found).await?;
+                let (_repository, store, found) = repository(objects, found).await?;
                 (Arc::new(store), found)
             }
             StoreKind::Zarr2 | StoreKind::Zarr3 => {
@@ -165,6 +173,7 @@ impl Foreign {
             chunks: Chunks::default(),
             place,
             found,
+            repository: None,
         };
         match wanted {
             Wanted::One(name) => own.add(&store, name).await,
@@ -256,6 +265,53 @@ impl Foreign {
         }
     }
 
+    /// What of an array changed since an earlier state of the repository. None where that cannot be told: it is no repository,
+    /// the state is no ancestor of this one or has been let go, or the array was made anew.
+    pub async fn changed_since(&self, snapshot: &str, array: &str) -> Option<Changed> {
+        let (repository, own) = (self.repository.as_ref()?, self.found.snapshot.as_deref()?);
+        if own == snapshot {
+            return Some(Changed(BTreeSet::new()));
+        }
+        let state = |text: &str| -> Option<VersionInfo> {
+            Some(VersionInfo::SnapshotId(text.try_into().ok()?))
+        };
+        let diff = repository.diff(&state(snapshot)?, &state(own)?).await;
+        let diff = diff
+            .inspect_err(|e| tracing::info!(error = first_lines(e), "what changed is not known"))
+            .ok()?;
+        let is_own = |path: &icechunk::format::Path| {
+            let path = path.to_string();
+            path == "/" || path.trim_start_matches('/') == array
+        };
+        let is_anew = diff.new_arrays.iter().any(is_own)
+            || diff.deleted_arrays.iter().any(is_own)
+            || diff.deleted_groups.iter().any(is_own)
+            || !diff.moved_nodes.is_empty();
+        if is_anew {
+            return None;
+        }
+        let chunks = diff.updated_chunks.iter().filter(|(path, _)| is_own(path));
+        let indexes = chunks.flat_map(|(_, chunks)| chunks);
+        let index = |chunk: &icechunk::format::ChunkIndices| {
+            chunk.0.iter().map(|index| u64::from(*index)).collect()
+        };
+        Some(Changed(indexes.map(index).collect()))
+    }
+
+    /// Does a part of an array lie in chunks that did not change?
+    ///
+    /// # Errors
+    /// There is no such part.
+    pub fn is_unchanged(
+        &self,
+        array: &str,
+        part: &[Range<u64>],
+        changed: &Changed,
+    ) -> Result<bool, ForeignError> {
+        let chunks = self.array(array)?.chunks_of(part)?;
+        Ok(!chunks.iter().any(|(index, _)| changed.0.contains(index)))
+    }
+
     /// Values of a part of an array, row-major, as float64.
     ///
     /// # Errors
@@ -274,7 +330,7 @@ impl Foreign {
 async fn repository(
     objects: Arc<dyn Objects>,
     found: Found,
-) -> Result<(AsyncIcechunkStore, Found), ForeignError> {
+) -> Result<(icechunk::Repository, AsyncIcechunkStore, Found), ForeignError> {
     let place = objects.place();
     let refused = |doing: &str, e: &dyn std::fmt::Display| {
         ForeignError::refused(&place, format!("{doing}: {}", first_lines(e)))
@@ -298,7 +354,7 @@ async fn repository(
         snapshot: Some(snapshot.to_string()),
         ..found
     };
-    Ok((AsyncIcechunkStore::new(session), found))
+    Ok((opened, AsyncIcechunkStore::new(session), found))
 }
 
 /// Documents of all arrays that came in one; nothing where they lie apart.

@@ -10,7 +10,7 @@ use cube::CubeError;
 use cube::migrate::{Migrated, Stage, migrate};
 use indicatif::ProgressBar;
 use serde::Serialize;
-use storage::manifests;
+use storage::{Store, manifests};
 
 use crate::cli::{Migrate, Settings};
 use crate::progress::day;
@@ -41,6 +41,7 @@ pub(crate) async fn run(settings: &Settings, options: &Migrate) -> Result<ExitCo
     } else {
         manifests::products(&store).await?
     };
+    let products = without_attached(&store, products).await?;
     let mut version_count = 0;
     for product in &products {
         version_count += manifests::numbers(&store, product).await?.len();
@@ -70,6 +71,26 @@ pub(crate) async fn run(settings: &Settings, options: &Migrate) -> Result<ExitCo
     } else {
         ExitCode::FAILURE
     })
+}
+
+/// Products whose values are here: of others there is nothing to bring over.
+async fn without_attached(store: &Store, all: Vec<ProductId>) -> Result<Vec<ProductId>> {
+    let mut here = vec![];
+    for product in all {
+        let newest = manifests::latest(store, &product).await?;
+        let attached = match &newest {
+            Some(newest) => store.attached_to(newest).await?,
+            None => None,
+        };
+        match attached {
+            Some(attachment) => progress::say(&format!(
+                "{product} is attached to {}: its values are not copied, and it has no cube",
+                attachment.place()
+            )),
+            None => here.push(product),
+        }
+    }
+    Ok(here)
 }
 
 /// Brings the bar to what is being done.

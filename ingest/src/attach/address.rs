@@ -4,14 +4,22 @@ use std::sync::Arc;
 
 use cube::foreign::{ForeignError, Objects, StoredObjects};
 
-/// Opens a folder of this machine, or a part of a bucket (`s3://`, `gs://`, `az://`). Nothing is sent for it.
+use crate::fetch::WebObjects;
+
+/// Opens a folder of this machine, a part of a bucket (`s3://`, `gs://`, `az://`), or what lies behind `http:` or `https:`.
+/// Nothing is sent for it.
 pub(super) fn open(address: &str) -> Result<Arc<dyn Objects>, ForeignError> {
-    if let Some((scheme, _)) = address.split_once("://")
-        && !matches!(scheme, "file" | "s3" | "gs" | "az" | "hdfs")
-    {
-        let reason =
-            "give a folder, or s3://BUCKET/PREFIX, gs://BUCKET/PREFIX, az://CONTAINER/PREFIX";
-        return Err(ForeignError::refused(scheme, reason));
+    match address.split_once("://").map(|(scheme, _)| scheme) {
+        Some("http" | "https") => Ok(Arc::new(WebObjects::new(address)?)),
+        None | Some("file" | "s3" | "gs" | "az" | "hdfs") => {
+            Ok(Arc::new(StoredObjects::open(address)?))
+        }
+        Some(scheme) => {
+            let reason = "give a folder, s3://BUCKET/PREFIX, gs://BUCKET/PREFIX, az://CONTAINER/PREFIX, or an address of http: or https:";
+            Err(ForeignError::refused(
+                format!("the scheme {scheme}"),
+                reason,
+            ))
+        }
     }
-    Ok(Arc::new(StoredObjects::open(address)?))
 }

@@ -12,6 +12,7 @@
 
 mod address;
 mod fields;
+mod kept;
 mod publish;
 mod reading;
 mod steps;

@@ -1,6 +1,6 @@
 //! A survey in, a version of the product out: steps read, references durable, then the manifest that names them.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use contract::event::RejectReason;
 use contract::grid::Grid;
@@ -11,11 +11,13 @@ use contract::quantity::Quantity;
 use storage::{StorageError, Store, domain, fields, manifests};
 
 use super::Attached;
-use super::steps::{self, Put, Read};
+use super::kept::kept;
+use super::steps::{self, Put};
 use super::survey::Survey;
 use crate::commit;
 use crate::error::{IngestError, Rejection, Stop};
 use crate::pipeline::grids::without_values;
+use crate::plan::PlannedStep;
 
 /// Reads all steps and publishes them as the next version.
 pub(super) async fn publish(
@@ -23,20 +25,26 @@ pub(super) async fn publish(
     survey: Survey,
     told: &(dyn Fn(usize, usize) + Send + Sync),
 ) -> Result<Attached, Stop> {
+    let product = survey.plan.target.product.clone();
+    // Before a value is read: what would be refused at the end is refused now.
+    let kept = match newest(store, &product).await? {
+        Some(newest) => {
+            let target = &survey.plan.target;
+            check_fits(
+                &newest,
+                survey.plan.mapping.grid,
+                (target.quantity, target.synthetic),
+            )?;
+            kept(store, &newest, &survey).await?
+        }
+        None => BTreeMap::new(),
+    };
     let Survey {
         mut plan,
         attachment,
         place,
+        ..
     } = survey;
-    let product = plan.target.product.clone();
-    // Before a value is read: what would be refused at the end is refused now.
-    if let Some(newest) = newest(store, &product).await? {
-        check_fits(
-            &newest,
-            plan.mapping.grid,
-            (plan.target.quantity, plan.target.synthetic),
-        )?;
-    }
     let digest = store.put_attachment(&attachment).await;
     let digest = digest.map_err(IngestError::storage("store where the values lie"))?;
     let origin = format!("{place}/{}", attachment.array);
@@ -46,8 +54,16 @@ pub(super) async fn publish(
         attachment: digest,
         origin: &origin,
     };
-    let wanted = plan.steps.clone();
+    let (known, wanted): (Vec<PlannedStep>, Vec<PlannedStep>) = plan
+        .steps
+        .iter()
+        .partition(|step| kept.contains_key(&step.time_index));
     let mut read = steps::read(&mut plan, put, &wanted, told).await?;
+    let is_all = kept.is_empty();
+    for (planned, kept) in known.iter().zip(kept.into_values()) {
+        read.steps
+            .push(put.again(planned, plan.mapping.grid, kept).await?);
+    }
     if read.steps.is_empty() {
         return Err(without_values(&plan, read.masked).into());
     }
@@ -55,12 +71,7 @@ pub(super) async fn publish(
     // The way back, before anybody goes it: address, credentials and all that the attachment keeps.
     let first = fields::read(store, &read.steps[0].field, &plan.mapping.grid).await;
     first.map_err(IngestError::storage("read an attached step again"))?;
-    let quantity = match read.range {
-        Some(range) => plan.target.quantity.over(range),
-        None => Ok(plan.target.quantity),
-    };
-    let quantity = quantity
-        .map_err(|e| Rejection::new(RejectReason::NoVariable, "quantity", e.to_string()))?;
+    let quantity = over(plan.target.quantity, read.range)?;
     let next = Next {
         product: &product,
         title: &plan.target.title,
@@ -69,7 +80,8 @@ pub(super) async fn publish(
         synthetic: plan.target.synthetic,
         grid: plan.mapping.grid,
     };
-    let (version, is_new) = next_version(store, &next, &read).await?;
+    let domain = is_all.then_some(&read.domain[..]);
+    let (version, is_new) = next_version(store, &next, (&read.steps, domain)).await?;
     Ok(Attached {
         is_new,
         place,
@@ -81,6 +93,15 @@ pub(super) async fn publish(
         version: version.id(),
         assumptions: plan.assumptions,
     })
+}
+
+/// The quantity with the range of its values; only open ones keep it.
+fn over(quantity: Quantity, range: Option<[f64; 2]>) -> Result<Quantity, Rejection> {
+    let Some(range) = range else {
+        return Ok(quantity);
+    };
+    let over = quantity.over(range);
+    over.map_err(|e| Rejection::new(RejectReason::NoVariable, "quantity", e.to_string()))
 }
 
 /// What the version will say of itself.
@@ -134,33 +155,44 @@ fn check_fits(
     .into())
 }
 
-/// Publishes the steps, unless the newest version has just these.
+/// Publishes the steps, unless the newest version has just these. `domain`: the cells that hold data, if all steps were read.
 async fn next_version(
     store: &Store,
     next: &Next<'_>,
-    read: &Read,
+    (steps, domain): (&[Step], Option<&[bool]>),
 ) -> Result<(Manifest, bool), Stop> {
     let mut pauses = commit::attempts();
     loop {
         let newest = newest(store, next.product).await?;
+        let (mut grid, mut quantity) = (next.grid, next.quantity);
         if let Some(newest) = &newest {
             check_fits(newest, next.grid, (next.quantity, next.synthetic))?;
-            if is_same(newest, &read.steps) {
+            if newest.steps == steps {
                 return Ok((newest.clone(), false));
             }
+            grid = newest.grid;
+            // Of what was not read only the version before knows the range.
+            if domain.is_none() {
+                quantity = newest.quantity.joined(quantity).unwrap_or(quantity);
+            }
         }
-        let domain = domain::write(store, next.product, &read.domain).await;
+        let domain = match domain {
+            Some(cells) => domain::write(store, next.product, cells)
+                .await
+                .map_err(IngestError::storage("store the domain"))?,
+            None => commit::domain(store, next.product, &grid, newest.as_ref(), steps).await?,
+        };
         let manifest = Manifest {
             schema: MANIFEST_SCHEMA,
             product: next.product.clone(),
             number: newest.as_ref().map_or(1, |newest| newest.number + 1),
             title: next.title.to_owned(),
-            quantity: next.quantity,
+            quantity,
             synthetic: next.synthetic,
             source: next.source.to_owned(),
-            grid: newest.as_ref().map_or(next.grid, |newest| newest.grid),
-            steps: read.steps.clone(),
-            domain: domain.map_err(IngestError::storage("store the domain"))?,
+            grid,
+            steps: steps.to_vec(),
+            domain,
             series: vec![],
             derived_from: None,
             computed: None,
@@ -177,10 +209,6 @@ async fn next_version(
             Err(e) => return Err(IngestError::storage("publish a manifest")(e).into()),
         }
     }
-}
-
-fn is_same(newest: &Manifest, steps: &[Step]) -> bool {
-    newest.steps == steps
 }
 
 /// Bytes of what this store holds for a version.

@@ -7,7 +7,7 @@ use storage::attached::Attachment;
 
 use crate::inspect::arrays::Indexes;
 use crate::plan::cf::axis::Mapping;
-use crate::plan::cf::coordinate::Axis;
+use crate::plan::cf::coordinate::{Axis, Role};
 use crate::plan::cf::packing::StoredPacking;
 
 /// How stored numbers of an array become values of a product.
@@ -37,5 +37,11 @@ impl Reading {
     pub(super) fn of(attachment: &Attachment) -> Result<Self, String> {
         Self::deserialize(&attachment.reading)
             .map_err(|e| format!("its attachment is of another program: {e}"))
+    }
+
+    /// Forgets how many steps there are.
+    pub(super) fn without_length_of_time(&mut self) {
+        let times = self.axes.iter_mut().filter(|axis| axis.role == Role::Time);
+        times.for_each(|axis| axis.len = 0);
     }
 }

@@ -4,6 +4,7 @@ use std::pin::pin;
 
 use contract::digest::Digest;
 use contract::grid::Grid;
+use contract::key::ObjectKey;
 use contract::manifest::Step;
 use contract::masked::MaskedCells;
 use contract::product::ProductId;
@@ -12,6 +13,7 @@ use futures::stream::{FuturesOrdered, StreamExt as _};
 use storage::Store;
 use storage::attached::Reference;
 
+use super::kept::Kept;
 use crate::check::{CheckedBand, Found};
 use crate::decode::DecodedBand;
 use crate::error::{IngestError, Stop};
@@ -40,6 +42,45 @@ pub(super) struct Put<'a> {
     pub(super) attachment: Digest,
     /// Name of the array with its store, for people.
     pub(super) origin: &'a str,
+}
+
+impl Put<'_> {
+    /// A step that was read before, of this attachment now.
+    pub(super) async fn again(
+        &self,
+        planned: &PlannedStep,
+        grid: Grid,
+        kept: Kept,
+    ) -> Result<Step, IngestError> {
+        let reference = self.reference(planned, grid);
+        let field = self.reference_to(&kept.values_sha256, &reference).await?;
+        Ok(Step {
+            field,
+            raw_sha256: self.attachment,
+            origin: self.origin.to_owned(),
+            ..kept.step
+        })
+    }
+
+    fn reference(&self, planned: &PlannedStep, grid: Grid) -> Reference {
+        Reference::new(
+            self.attachment,
+            (planned.time_index, planned.period),
+            [grid.rows, grid.cols],
+            [planned.factor, planned.offset],
+        )
+    }
+
+    async fn reference_to(
+        &self,
+        values_sha256: &Digest,
+        reference: &Reference,
+    ) -> Result<ObjectKey, IngestError> {
+        let put = self
+            .store
+            .put_reference(self.product, values_sha256, reference);
+        put.await.map_err(IngestError::storage("store a reference"))
+    }
 }
 
 /// Steps of the plan that are wanted, one after the other; what is to be done with each is done beside the reading of the next.
@@ -131,18 +172,8 @@ impl Own<'_> {
                 values,
             });
         }
-        let reference = Reference::new(
-            self.put.attachment,
-            (planned.time_index, planned.period),
-            [grid.rows, grid.cols],
-            [planned.factor, planned.offset],
-        );
-        let field = self
-            .put
-            .store
-            .put_reference(self.put.product, &digest, &reference)
-            .await
-            .map_err(IngestError::storage("store a reference"))?;
+        let reference = self.put.reference(&planned, grid);
+        let field = self.put.reference_to(&digest, &reference).await?;
         let step = Step {
             period: planned.period,
             field,

@@ -4,6 +4,8 @@ use std::sync::Arc;
 
 use contract::event::RejectReason;
 use contract::product::ProductId;
+use contract::quantity::Quantity;
+use cube::Description;
 use cube::foreign::{Absent, Foreign, Found};
 use storage::attached::Attachment;
 
@@ -14,13 +16,17 @@ use crate::inspect::arrays::{self, Arrays, Indexes};
 use crate::inspect::values::Values;
 use crate::limits::Limits;
 use crate::plan::cf::packing::{StoredPacking, Unpacked};
+use crate::plan::cf::quantity::Named;
 use crate::plan::profile::Profile;
+use crate::plan::unit::Substance;
 use crate::plan::{self, Plan, Wish};
 
 /// What was found at an address, and what of it is read as what.
 pub(super) struct Survey {
     pub(super) plan: Plan,
     pub(super) attachment: Attachment,
+    pub(super) foreign: Arc<Foreign>,
+    pub(super) indexes: Indexes,
     /// Name of the store, for people.
     pub(super) place: String,
 }
@@ -49,11 +55,14 @@ impl Survey {
         let indexes: Indexes = request.indexes.iter().cloned().collect();
         let description = arrays::describe(&foreign, &indexes)?;
         let fill = array.fill;
+        let own = of_this_program(&foreign, variable).filter(|_| profile.is_none());
         let wish = Wish {
             profile,
             product: request.product.as_ref(),
             variable: Some(variable),
+            meaning: own.as_ref().map(meaning),
         };
+        let is_synthetic = own.is_some_and(|own| own.synthetic);
         // What is not there is fill value: no data, if the conventions say that of it.
         let own = description.variable(variable);
         let packing = own.map(|own| plan::packing(own, profile)).transpose()?;
@@ -72,7 +81,8 @@ impl Survey {
             limits.plane_cells,
         );
         let held = (Values::Arrays(values), &description);
-        let plan = plan::plan(held, &file_name(&place), wish, limits).await?;
+        let mut plan = plan::plan(held, &file_name(&place), wish, limits).await?;
+        plan.target.synthetic |= is_synthetic;
         if plan.quality.is_some() {
             let detail = "asks by [quality] for a second array, which attached products are not read with; leave it out or land the files";
             return Err(Rejection::new(RejectReason::Values, "profile", detail).into());
@@ -81,7 +91,7 @@ impl Survey {
             quantity: plan.target.quantity,
             profile: request.profile.clone(),
             axes: plan.axes.clone(),
-            indexes,
+            indexes: indexes.clone(),
             mapping: plan.mapping.clone(),
             packing: StoredPacking::from(&plan.packing),
             absent_is_no_data: is_no_data,
@@ -90,8 +100,26 @@ impl Survey {
         Ok(Self {
             plan,
             attachment,
+            foreign,
+            indexes,
             place,
         })
+    }
+}
+
+/// What a cube that this program wrote says of its values.
+fn of_this_program(foreign: &Foreign, variable: &str) -> Option<Description> {
+    let own = Description::read(&foreign.attributes, "").ok()?;
+    (cube::cf::variable(own.quantity) == variable).then_some(own)
+}
+
+/// In the stored unit, positive as everything stored is.
+fn meaning(own: &Description) -> Named {
+    let is_carbon = own.quantity == Quantity::CarbonFlux;
+    Named {
+        quantity: own.quantity,
+        sign: 1.0,
+        substance: is_carbon.then_some(Substance::Carbon),
     }
 }
 

@@ -21,7 +21,7 @@ pub(crate) const FIELDS_AT_ONCE: usize = 2;
 ///
 /// What was dropped or revised may have held the only value of a cell: of such cells other steps are looked at until each was
 /// found in one, which most are in the first; no further than the window that the rest lie in.
-pub(super) async fn write(
+pub(crate) async fn write(
     store: &Store,
     product: &ProductId,
     grid: &Grid,

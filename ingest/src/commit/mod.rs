@@ -23,6 +23,7 @@ use crate::put::StoredGranule;
 use merge::{Change, Merged};
 
 pub(crate) use extent::FIELDS_AT_ONCE;
+pub(crate) use extent::write as domain;
 pub(crate) use mend::mend;
 pub(crate) use merge::{is_later_or_same, is_same_grid};
 pub(crate) use replace::replace;

@@ -10,8 +10,8 @@ use std::time::Duration;
 
 use contract::event::RejectReason;
 use reqwest::dns::{Addrs, Name, Resolve, Resolving};
-use reqwest::header::LOCATION;
-use reqwest::{Client, Response, StatusCode, redirect};
+use reqwest::header::{LOCATION, RANGE};
+use reqwest::{Client, Method, Response, StatusCode, redirect};
 use url::{Host, Url};
 
 use super::address::is_public;
@@ -77,6 +77,14 @@ impl FromStr for AllowedHost {
 }
 
 impl AllowedHost {
+    /// The host and port of an address that the user gives.
+    pub(super) fn of(url: &Url) -> Option<Self> {
+        Some(Self {
+            host: url.host()?.to_owned(),
+            port: url.port_or_known_default(),
+        })
+    }
+
     fn is(&self, url: &Url) -> bool {
         url.host().is_some_and(|host| host.to_owned() == self.host)
             && self
@@ -124,15 +132,25 @@ impl Web {
 
     /// The answer that holds the file.
     pub(super) async fn get(&self, url: &Url) -> Result<Response, Miss> {
+        let response = self.answer(url, Method::GET, None).await?;
+        match response.status() {
+            StatusCode::OK => Ok(response),
+            status => Err(miss(status)),
+        }
+    }
+
+    /// The answer at the end of all redirects, whatever it says; `range` is what its header asks for.
+    pub(super) async fn answer(
+        &self,
+        url: &Url,
+        method: Method,
+        range: Option<&str>,
+    ) -> Result<Response, Miss> {
         let mut url = url.clone();
         for _ in 0..=MAX_REDIRECTS {
-            let response = self.ask(&url).await?;
-            let status = response.status();
-            if status == StatusCode::OK {
+            let response = self.ask(&url, method.clone(), range).await?;
+            if !is_redirect(response.status()) {
                 return Ok(response);
-            }
-            if !is_redirect(status) {
-                return Err(miss(status));
             }
             url = next(&url, &response)?;
         }
@@ -142,7 +160,7 @@ impl Web {
         Err(refused(detail).into())
     }
 
-    async fn ask(&self, url: &Url) -> Result<Response, Miss> {
+    async fn ask(&self, url: &Url, method: Method, range: Option<&str>) -> Result<Response, Miss> {
         let is_allowed = self.allowed.iter().any(|allowed| allowed.is(url));
         if !is_allowed && is_inner(url) {
             return Err(internal(url).into());
@@ -152,7 +170,12 @@ impl Web {
         } else {
             &self.public
         };
-        client.get(url.clone()).send().await.map_err(|error| {
+        let request = client.request(method, url.clone());
+        let request = match range {
+            Some(range) => request.header(RANGE, range),
+            None => request,
+        };
+        request.send().await.map_err(|error| {
             if is_not_public(&error) {
                 internal(url).into()
             } else {
@@ -199,7 +222,7 @@ fn next(url: &Url, response: &Response) -> Result<Url, Rejection> {
 }
 
 /// What an answer without the file means.
-fn miss(status: StatusCode) -> Miss {
+pub(super) fn miss(status: StatusCode) -> Miss {
     let text = format!("the server answered {status}");
     match status.as_u16() {
         408 | 425 | 429 | 500..=599 => Miss::Away(text),

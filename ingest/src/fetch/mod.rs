@@ -18,6 +18,7 @@ mod source_wait;
 mod spool;
 mod stored;
 mod turns;
+mod web_objects;
 
 pub(crate) use checksum::{Expected, Method};
 pub(crate) use guard::Allowed;
@@ -28,6 +29,7 @@ pub(crate) use raw::{HELD_BYTES, RawGranule};
 pub use retry::RetryLimits;
 pub(crate) use source_wait::SourceWait;
 pub(crate) use stored::RawFiles;
+pub(crate) use web_objects::WebObjects;
 
 use crate::error::Stop;
 use crate::settings::Settings;

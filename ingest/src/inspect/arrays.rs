@@ -69,18 +69,7 @@ impl Arrays {
         part: &[Part],
     ) -> Result<Vec<f64>, ForeignError> {
         let array = self.foreign.array(variable)?;
-        let mut parts = part.iter();
-        let mut ranges: Vec<Range<u64>> = vec![];
-        for (name, len) in &array.dimensions {
-            ranges.push(match self.index(array, name.as_deref()) {
-                Some(index) => index..index.saturating_add(1),
-                None => match parts.next() {
-                    Some(Part::At(index)) => *index..index.saturating_add(1),
-                    Some(Part::Some { first, count }) => *first..first.saturating_add(*count),
-                    Some(Part::All) | None => 0..*len,
-                },
-            });
-        }
+        let ranges = Self::ranges(array, &self.indexes, part);
         let absent = if self.absent.0 == variable {
             self.absent.1
         } else {
@@ -89,12 +78,28 @@ impl Arrays {
         self.foreign.read(variable, &ranges, absent).await
     }
 
-    /// The index that is read of a dimension of an array; none of one that is its own coordinate, or not named.
-    fn index(&self, array: &ForeignArray, dimension: Option<&str>) -> Option<u64> {
-        index(&self.indexes, array, dimension)
+    /// A part as ranges along all dimensions of an array.
+    pub(crate) fn ranges(
+        array: &ForeignArray,
+        indexes: &Indexes,
+        part: &[Part],
+    ) -> Vec<Range<u64>> {
+        let mut parts = part.iter();
+        let dimensions = array.dimensions.iter();
+        dimensions
+            .map(|(name, len)| match index(indexes, array, name.as_deref()) {
+                Some(index) => index..index.saturating_add(1),
+                None => match parts.next() {
+                    Some(Part::At(index)) => *index..index.saturating_add(1),
+                    Some(Part::Some { first, count }) => *first..first.saturating_add(*count),
+                    Some(Part::All) | None => 0..*len,
+                },
+            })
+            .collect()
     }
 }
 
+/// The index that is read of a dimension of an array; none of one that is its own coordinate, or not named.
 fn index(indexes: &Indexes, array: &ForeignArray, dimension: Option<&str>) -> Option<u64> {
     let dimension = dimension.filter(|name| *name != array.name)?;
     indexes.get(dimension).copied()

@@ -59,6 +59,7 @@ impl Order {
             profile: self.profile.as_ref(),
             product: self.product.as_ref(),
             variable: self.variable.as_deref(),
+            meaning: None,
         }
     }
 }

@@ -158,6 +158,9 @@ impl Pipeline<'_> {
         let planned = metrics.timed("plan", planned).await?;
         let product = planned.plan.target.product.clone();
         let newest = self.newest(&planned).await?;
+        if let Some(newest) = &newest {
+            self.check_is_here(newest).await?;
+        }
         let unchanged = newest
             .as_ref()
             .and_then(|newest| unchanged(newest, &planned, wish, way.notice.place));
@@ -193,6 +196,21 @@ impl Pipeline<'_> {
     ) -> Result<Option<Manifest>, IngestError> {
         let newest = manifests::latest(self.store, &planned.plan.target.product).await;
         newest.map_err(IngestError::storage("read the newest manifest"))
+    }
+
+    /// Refuses a file of a product whose values lie elsewhere.
+    async fn check_is_here(&self, newest: &Manifest) -> Result<(), Stop> {
+        let attached = self.store.attached_to(newest).await;
+        let attached = attached.map_err(IngestError::storage("read what it is attached to"))?;
+        let Some(attachment) = attached else {
+            return Ok(());
+        };
+        let detail = format!(
+            "{} is attached to {}; land the file in a product of its own",
+            newest.product,
+            attachment.place()
+        );
+        Err(Rejection::new(RejectReason::Conflict, "product", detail).into())
     }
 
     /// Publishes files of one product, in their order.

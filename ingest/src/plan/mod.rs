@@ -31,6 +31,7 @@ use crate::plan::cf::axis::Mapping;
 use crate::plan::cf::coordinate::{self, Axis, Role};
 use crate::plan::cf::open;
 use crate::plan::cf::packing::Packing;
+use crate::plan::cf::quantity::Named;
 use crate::plan::profile::Profile;
 use crate::plan::recipe::Recipe;
 use crate::settings::Settings;
@@ -94,6 +95,8 @@ pub(crate) struct Wish<'a> {
     pub(crate) product: Option<&'a ProductId>,
     /// The variable to land of a file that no profile is for.
     pub(crate) variable: Option<&'a str>,
+    /// What that variable means, where it is known beyond what it says: a cube of this program.
+    pub(crate) meaning: Option<Named>,
 }
 
 /// A file on its way through planning.

@@ -22,6 +22,9 @@ pub(super) fn choose<'a>(
     file: &'a Description,
     wish: Wish<'_>,
 ) -> Result<(&'a Variable, Named, Option<String>), Rejection> {
+    if let (Some(meaning), Some(name)) = (wish.meaning, wish.variable) {
+        return Ok((main_variable::asked(file, name)?, meaning, None));
+    }
     let Some(profile) = wish.profile else {
         return choose_by_file(file, wish.variable);
     };

@@ -38,6 +38,15 @@ pub async fn plan(
     let manifest = newest
         .map_err(IngestError::storage("read the newest manifest"))?
         .ok_or_else(|| stays("there is no such product".to_owned()))?;
+    let attached = store.attached_to(&manifest).await;
+    let attached = attached.map_err(IngestError::storage("read what it is attached to"))?;
+    if let Some(attachment) = attached {
+        let product = &request.product;
+        return Err(stays(format!(
+            "it is attached to {}, and has no files here; run `fluxglobe attach --refresh {product}`",
+            attachment.place()
+        )));
+    }
     if let (Some(from), Some(to)) = (request.from, request.to)
         && from >= to
     {

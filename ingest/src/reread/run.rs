@@ -110,6 +110,7 @@ impl Work<'_> {
             profile,
             product: Some(self.product),
             variable,
+            meaning: None,
         };
         if item.is_read {
             let recipe = Recipe::of(wish);

@@ -3,6 +3,8 @@
 #![expect(clippy::float_cmp, reason = "these numbers are exact")]
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod attached;
+mod attached_web;
 mod attributes;
 mod axes;
 mod bad_input;

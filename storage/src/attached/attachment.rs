@@ -9,8 +9,6 @@ use crate::sound::damage;
 
 /// Version of the JSON of references and attachments as it is written.
 pub(super) const SCHEMA: u32 = 1;
-/// Begins both: neither a Parquet file nor a file of any format that lands begins so.
-const MARK: &[u8] = b"{\"attached\":";
 /// Largest attachment: one that names every row and column of the largest grid is far below.
 pub(super) const MAX_ATTACHMENT_BYTES: u64 = 64 << 20;
 
@@ -94,9 +92,4 @@ impl Attachment {
         );
         Err(StorageError::damaged(key.as_str(), reason))
     }
-}
-
-/// Is this a reference or an attachment, and neither a field nor a file?
-pub fn is_attached(content: &[u8]) -> bool {
-    content.starts_with(MARK)
 }

@@ -7,8 +7,9 @@ use contract::product::ProductId;
 use contract::time::Period;
 use serde::{Deserialize, Serialize};
 
-use super::attachment::{SCHEMA, is_attached};
+use super::attachment::SCHEMA;
 use crate::StorageError;
+use crate::attached_mark::is_attached;
 use crate::sound::{damage, seal};
 
 /// Largest reference: no field of more bytes is looked at as one.

@@ -6,6 +6,7 @@
 #![expect(clippy::unwrap_used, reason = "a test ends where it cannot go on")]
 #![expect(clippy::print_stdout, reason = "a test of faults says how many fired")]
 
+mod attached;
 mod conformance;
 mod cut_proxy;
 mod fault_proxy;

@@ -1,0 +1,195 @@
+//! Objects of a store of others behind `http:` or `https:`: by name below an address, whole or in part. Nothing can be listed.
+//!
+//! The host that the user names is asked, wherever it is; where a redirect leads must be a public address, as for files that a
+//! notice names ([`super::http`]).
+
+use std::time::Duration;
+
+use async_trait::async_trait;
+use bytes::{Bytes, BytesMut};
+use cube::foreign::{ForeignError, Objects};
+use object_store::GetRange;
+use reqwest::header::CONTENT_LENGTH;
+use reqwest::{Method, Response, StatusCode};
+use retry::Backoff;
+use url::Url;
+
+use super::http::{AllowedHost, Web, away, miss};
+use super::location::shown;
+use super::retry::Miss;
+use crate::error::Stop;
+
+/// How long a server that does not answer, or is out of order, is asked again: somebody waits.
+const AWAY_LIMIT: Duration = Duration::from_secs(20);
+
+/// Objects below an address.
+#[derive(Debug)]
+pub(crate) struct WebObjects {
+    base: Url,
+    web: Web,
+}
+
+impl WebObjects {
+    /// Objects below an address.
+    ///
+    /// # Errors
+    /// It is no address, or holds what may be secret: it is stored and shown.
+    pub(crate) fn new(address: &str) -> Result<Self, ForeignError> {
+        let refused = |reason: &str| ForeignError::refused("the address", reason);
+        let base = Url::parse(address).map_err(|e| refused(&format!("is no URL: {e}")))?;
+        if !base.username().is_empty() || base.password().is_some() {
+            return Err(refused(
+                "holds a name or a password: it is stored and shown, give it without",
+            ));
+        }
+        if base.query().is_some() || base.fragment().is_some() {
+            return Err(refused(
+                "has something behind ? or #, which is stored and shown: give it without",
+            ));
+        }
+        let host = AllowedHost::of(&base).ok_or_else(|| refused("has no host"))?;
+        let web = Web::new(vec![host]).map_err(|e| refused(&e.to_string()))?;
+        Ok(Self { base, web })
+    }
+
+    fn url(&self, name: &str) -> Url {
+        let mut url = self.base.clone();
+        if let Ok(mut parts) = url.path_segments_mut() {
+            parts.pop_if_empty().extend(name.split('/'));
+        }
+        url
+    }
+
+    /// The answer for an object, after as many tries as the server needs; none if it is not there.
+    async fn answer(
+        &self,
+        name: &str,
+        method: Method,
+        range: Option<&str>,
+    ) -> Result<Option<Response>, ForeignError> {
+        let url = self.url(name);
+        let mut pauses = Backoff::within(AWAY_LIMIT).pauses();
+        loop {
+            let answer = self.web.answer(&url, method.clone(), range).await;
+            let failure = match answer {
+                Ok(answer) => match answer.status() {
+                    StatusCode::OK | StatusCode::PARTIAL_CONTENT => return Ok(Some(answer)),
+                    StatusCode::NOT_FOUND | StatusCode::GONE => return Ok(None),
+                    status => miss(status),
+                },
+                Err(failure) => failure,
+            };
+            let error = failed(&url, failure);
+            let pause = pauses.next().filter(|_| error.is_retryable);
+            let Some(pause) = pause else {
+                return Err(error);
+            };
+            tokio::time::sleep(pause).await;
+        }
+    }
+}
+
+fn failed(url: &Url, failure: Miss) -> ForeignError {
+    let place = shown(url);
+    match failure {
+        Miss::Away(reason) => ForeignError::away(place, reason),
+        Miss::Absent(reason) => ForeignError::refused(
+            place,
+            format!(
+                "{reason}: it is not given to whoever asks, and this program sends no credentials over HTTP"
+            ),
+        ),
+        Miss::Stop(Stop::Rejected(rejection)) => {
+            // What a service may be told to allow is not for whoever names an address.
+            let reason = rejection.detail.split("; allow it").next();
+            ForeignError::refused(place, reason.unwrap_or_default())
+        }
+        Miss::Stop(Stop::Failed(error)) => ForeignError::away(place, error.to_string()),
+    }
+}
+
+/// The header that asks for a part.
+fn header(part: &GetRange) -> String {
+    match part {
+        GetRange::Bounded(range) => {
+            format!("bytes={}-{}", range.start, range.end.saturating_sub(1))
+        }
+        GetRange::Offset(start) => format!("bytes={start}-"),
+        GetRange::Suffix(length) => format!("bytes=-{length}"),
+    }
+}
+
+/// The content of an answer, which may say another length than it has.
+async fn content(
+    mut answer: Response,
+    place: &str,
+    most_bytes: u64,
+) -> Result<Bytes, ForeignError> {
+    let too_large = |bytes: u64| {
+        let reason = format!("has {bytes} bytes, at most {most_bytes} are read");
+        ForeignError::refused(place, reason)
+    };
+    if let Some(bytes) = answer.content_length().filter(|bytes| *bytes > most_bytes) {
+        return Err(too_large(bytes));
+    }
+    let mut content = BytesMut::new();
+    loop {
+        let piece = answer.chunk().await;
+        let piece = piece.map_err(|e| match away(e) {
+            Miss::Away(reason) | Miss::Absent(reason) => ForeignError::away(place, reason),
+            Miss::Stop(_) => ForeignError::away(place, "broke off"),
+        })?;
+        let Some(piece) = piece else {
+            return Ok(content.freeze());
+        };
+        content.extend_from_slice(&piece);
+        if content.len() as u64 > most_bytes {
+            return Err(too_large(content.len() as u64));
+        }
+    }
+}
+
+#[async_trait]
+impl Objects for WebObjects {
+    fn place(&self) -> String {
+        shown(&self.base).trim_end_matches('/').to_owned()
+    }
+
+    async fn get(
+        &self,
+        name: &str,
+        part: Option<GetRange>,
+        most_bytes: u64,
+    ) -> Result<Option<Bytes>, ForeignError> {
+        let range = part.as_ref().map(header);
+        let answer = self.answer(name, Method::GET, range.as_deref()).await?;
+        let Some(answer) = answer else {
+            return Ok(None);
+        };
+        let place = shown(&self.url(name));
+        let is_part = answer.status() == StatusCode::PARTIAL_CONTENT;
+        let content = content(answer, &place, most_bytes).await?;
+        let Some(part) = part.filter(|_| !is_part) else {
+            return Ok(Some(content));
+        };
+        // A server that knows no parts sends all.
+        let range = part.as_range(content.len() as u64);
+        let range = range.map_err(|e| ForeignError::refused(place, e.to_string()))?;
+        Ok(Some(
+            content.slice(range.start as usize..range.end as usize),
+        ))
+    }
+
+    async fn size(&self, name: &str) -> Result<Option<u64>, ForeignError> {
+        let Some(answer) = self.answer(name, Method::HEAD, None).await? else {
+            return Ok(None);
+        };
+        let length = answer.headers().get(CONTENT_LENGTH);
+        let length = length.and_then(|length| length.to_str().ok()?.parse().ok());
+        Ok(Some(length.unwrap_or_default()))
+    }
+
+    async fn folders(&self, _folder: &str) -> Result<Option<Vec<String>>, ForeignError> {
+        Ok(None)
+    }
+}

@@ -1,0 +1,117 @@
+//! Stores of others behind HTTP: read by known names, and what a server can do wrong.
+
+use std::path::PathBuf;
+
+use serde_json::json;
+use storage::fields;
+
+use crate::attached::{Own, assert_same, expected, fixture, readable, request};
+use crate::web_server::{Answer, WebServer};
+
+/// Serves the files of a folder under `/data/`; what is not there is 404.
+async fn serve(folder: PathBuf) -> WebServer {
+    WebServer::start(Box::new(move |path| {
+        let name = path.trim_start_matches("/data/");
+        match std::fs::read(folder.join(name)) {
+            Ok(content) => Answer::Whole("200 OK", vec![], content),
+            Err(_) => Answer::Whole("404 Not Found", vec![], vec![]),
+        }
+    }))
+    .await
+}
+
+fn address(server: &WebServer) -> String {
+    format!("http://{}/data", server.address)
+}
+
+#[tokio::test]
+async fn stores_are_read_over_http_with_and_without_consolidated_metadata() {
+    for name in [
+        "v2-blosc.zarr",
+        "v2-plain.zarr",
+        "v3-zstd.zarr",
+        "v3-gzip.zarr",
+        "v3-sharded.zarr",
+    ] {
+        let server = serve(fixture(name)).await;
+        let own = Own::new();
+        let attached = own.ask(&request(&address(&server), "sst")).await.unwrap();
+        assert_eq!(attached.steps, 3, "{name}");
+        let newest = own.newest().await;
+        for (step, expected) in expected(name).iter().enumerate() {
+            let values = own.values(&newest, step).await.unwrap();
+            assert_same(&values, expected, &format!("{name} step {step}"));
+        }
+    }
+}
+
+#[tokio::test]
+async fn what_a_server_answers_wrong_is_refused() {
+    let own = Own::with("v3-gzip.zarr");
+    let folder = own.path();
+    let answers = move |path: &str| {
+        let (way, name) = path.trim_start_matches('/').split_once('/').unwrap();
+        let whole = || std::fs::read(folder.join(name)).ok();
+        let is_chunk = name.contains("sst/c/");
+        match (way, whole()) {
+            ("closed", _) => Answer::Whole("403 Forbidden", vec![], vec![]),
+            ("inner", _) => {
+                let location = "Location: http://169.254.169.254/latest".to_owned();
+                Answer::Whole("302 Found", vec![location], vec![])
+            }
+            ("half", Some(content)) if is_chunk => Answer::Half(content),
+            ("huge", Some(content)) if name == "zarr.json" => {
+                let mut content = content;
+                content.resize(17 << 20, b' ');
+                Answer::Whole("200 OK", vec![], content)
+            }
+            (_, Some(content)) => Answer::Whole("200 OK", vec![], content),
+            (_, None) => Answer::Whole("404 Not Found", vec![], vec![]),
+        }
+    };
+    let server = WebServer::start(Box::new(answers)).await;
+    for (way, said) in [
+        ("closed", "403 Forbidden"),
+        (
+            "inner",
+            "leads to 169.254.169.254, which is no address of the public network",
+        ),
+        ("huge", "17825792 bytes, at most 16777216 are read"),
+        ("half", "sst/c/0/0/0"),
+    ] {
+        let address = format!("http://{}/{way}", server.address);
+        let error = own.ask(&request(&address, "sst")).await.unwrap_err();
+        assert!(error.contains(said), "{way}: {error}");
+        assert!(!error.contains("--allow-host"), "{error}");
+    }
+    for (address, said) in [
+        ("http://user:secret@127.0.0.1/x", "name or a password"),
+        ("https://127.0.0.1/x?token=secret", "behind ? or #"),
+        ("ftp://127.0.0.1/x", "http: or https:"),
+    ] {
+        let error = own.ask(&request(address, "sst")).await.unwrap_err();
+        assert!(error.contains(said) && !error.contains("secret"), "{error}");
+    }
+}
+
+#[tokio::test]
+async fn what_changed_behind_http_is_an_error_that_names_it() {
+    let own = Own::with("v2-plain.zarr");
+    own.edit(".zattrs", |it| it["title"] = json!("over HTTP"));
+    let server = serve(own.path()).await;
+    own.ask(&request(&address(&server), "sst")).await.unwrap();
+    let newest = own.newest().await;
+    std::fs::copy(own.path().join("sst/0.0.0"), own.path().join("sst/1.0.0")).unwrap();
+    let later = readable(&own.store.bare());
+    let error = fields::read(&later, &newest.steps[1].field, &newest.grid)
+        .await
+        .unwrap_err();
+    assert!(!error.is_retryable(), "{error}");
+    assert!(error.to_string().contains("/data array sst"), "{error}");
+    assert!(
+        error
+            .to_string()
+            .contains("has changed since it was attached"),
+        "{error}"
+    );
+}

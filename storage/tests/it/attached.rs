@@ -1,0 +1,129 @@
+//! References in the place of fields: what comes out is the field that they refer to, or an error.
+
+use std::sync::Arc;
+
+use async_trait::async_trait;
+use bytes::Bytes;
+use contract::grid::Grid;
+use contract::key::ObjectKey;
+use contract::kind::Vouched;
+use contract::time::Period;
+use object_store::path::Path;
+use storage::attached::{Attachment, Failure, Reference, Source, StoreKind};
+use storage::{Store, fields};
+
+const GRID: Grid = Grid {
+    rows: 2,
+    cols: 3,
+    north_deg: 1.0,
+    west_deg: 0.0,
+    dlat_deg: 1.0,
+    dlon_deg: 1.0,
+};
+
+/// A store of others that holds these values in every step.
+#[derive(Debug)]
+struct Fixed(Vec<f32>);
+
+#[async_trait]
+impl Source for Fixed {
+    async fn values(
+        &self,
+        _attachment: &Arc<Attachment>,
+        _reference: &Reference,
+    ) -> Result<Vec<f32>, Failure> {
+        Ok(self.0.clone())
+    }
+}
+
+fn values() -> Vec<f32> {
+    vec![1.0, 2.0, f32::NAN, 4.0, 5.0, 6.0]
+}
+
+/// A store with one reference, and the bytes that a field of its values has.
+async fn attached() -> (Store, ObjectKey, Bytes) {
+    let (store, product) = (Store::memory(), "p".parse().unwrap());
+    let period = Period::month(2000, 1).unwrap();
+    let encoded = fields::encode(&GRID, &values(), period).unwrap();
+    let place = ("s3://b/x".to_owned(), StoreKind::Zarr3, None);
+    let attachment = Attachment::new(product, place, "sst".to_owned(), serde_json::Value::Null);
+    let name = store.put_attachment(&attachment).await.unwrap();
+    let reference = Reference::new(name, (7, period), [2, 3], [1.0, 0.0]);
+    let product = attachment.product;
+    let key = store.put_reference(&product, &encoded.values_sha256, &reference);
+    (store.clone(), key.await.unwrap(), encoded.content)
+}
+
+#[tokio::test]
+async fn whoever_asks_gets_the_bytes_of_the_field() {
+    let (store, key, field) = attached().await;
+    let layered = store.with_attached(Arc::new(Fixed(values())));
+    assert_eq!(layered.get(&key).await.unwrap(), field);
+    assert_eq!(layered.size_bytes(&key).await.unwrap(), field.len() as u64);
+    let end = field.len() as u64;
+    let part = layered.get_range(&key, end - 8..end).await.unwrap();
+    assert_eq!(part, field.slice(field.len() - 8..));
+    // A reader that has not asked for the size before, of a part that lies behind the end of the reference.
+    let anew = store.with_attached(Arc::new(Fixed(values())));
+    let path = Path::from(key.as_str());
+    let (objects, ends) = (anew.object_store(), [0..4, end - 4..end]);
+    let parts = objects.get_ranges(&path, &ends).await.unwrap();
+    assert_eq!(parts, ["PAR1", "PAR1"]);
+    let read = fields::read(&layered, &key, &GRID).await.unwrap();
+    assert!(
+        read.iter()
+            .zip(values())
+            .all(|(a, b)| *a == b || b.is_nan())
+    );
+    // The same values landed are the same field, and change nothing.
+    let period = Period::month(2000, 1).unwrap();
+    let product = "p".parse().unwrap();
+    let landed = fields::write(&layered, &product, &GRID, &values(), period).await;
+    assert_eq!(landed.unwrap(), key);
+    assert!(store.size_bytes(&key).await.unwrap() < 512, "a reference");
+}
+
+#[tokio::test]
+async fn other_values_than_those_of_the_name_never_come_out() {
+    let (store, key, _field) = attached().await;
+    let mut other = values();
+    other[5] = f32::from_bits(6f32.to_bits() ^ 1);
+    for other in [other, vec![1.0; 5], vec![]] {
+        let layered = store.with_attached(Arc::new(Fixed(other)));
+        let error = layered.get(&key).await.unwrap_err();
+        assert!(
+            !error.is_retryable() && error.attached().is_some(),
+            "{error}"
+        );
+        let text = error.to_string();
+        assert!(text.contains("s3://b/x array sst"), "{text}");
+        assert!(text.contains("fluxglobe attach --refresh p"), "{text}");
+        let path = Path::from(key.as_str());
+        let range = layered.object_store();
+        assert!(range.get_ranges(&path, &[0..4]).await.is_err());
+    }
+}
+
+#[tokio::test]
+async fn a_reference_that_moves_keeps_its_name_and_a_field_is_never_replaced() {
+    let (store, key, field) = attached().await;
+    let before = store.reference(&key).await.unwrap().unwrap();
+    let own = (8, before.period);
+    let moved = Reference::new(before.attachment, own, [2, 3], [1.0, 0.0]);
+    let product = "p".parse().unwrap();
+    let Vouched::Values(digest) = key.vouches() else {
+        panic!("{key} is named by its values");
+    };
+    store
+        .put_reference(&product, &digest, &moved)
+        .await
+        .unwrap();
+    assert_eq!(store.reference(&key).await.unwrap(), Some(moved));
+    // Landed: the values are here now, and stay.
+    store.put_over(&key, field.clone()).await.unwrap();
+    store
+        .put_reference(&product, &digest, &before)
+        .await
+        .unwrap();
+    assert_eq!(store.get(&key).await.unwrap(), field);
+}
