@@ -67,7 +67,7 @@ pub(crate) struct AreaParameters {
         content(
             (inline(SeriesOrStatistics<RegionSeries>) = "application/json"),
             (String = "text/csv"),
-            (Vec<u8> = "application/vnd.apache.arrow.file"),
+            ("application/vnd.apache.arrow.file"),
         ),
     )),
 )]

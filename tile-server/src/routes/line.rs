@@ -59,7 +59,7 @@ pub(crate) struct LineParameters {
         content(
             (StatisticsAnswer = "application/json"),
             (String = "text/csv"),
-            (Vec<u8> = "application/vnd.apache.arrow.file"),
+            ("application/vnd.apache.arrow.file"),
         ),
     )),
 )]

@@ -64,7 +64,7 @@ pub(crate) struct PointParameters {
         content(
             (inline(SeriesOrStatistics<PointSeries>) = "application/json"),
             (String = "text/csv"),
-            (Vec<u8> = "application/vnd.apache.arrow.file"),
+            ("application/vnd.apache.arrow.file"),
         ),
     )),
 )]

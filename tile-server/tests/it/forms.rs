@@ -47,8 +47,9 @@ async fn an_answer_has_the_form_that_is_asked_for() {
             }
         }
         // What is said in the address is meant; the header is what a library sends.
-        let both = app.get_with(&format!("{path}&format=csv"), &[("accept", ARROW)]);
-        assert_eq!(both.await.header("content-type"), "text/csv");
+        let csv = format!("{path}&format=csv");
+        let both = app.get_with(&csv, &[("accept", ARROW)]).await;
+        assert_eq!(both.header("content-type"), "text/csv");
         let any = app
             .get_with(&path, &[("accept", "text/html, */*;q=0.8")])
             .await;
@@ -107,7 +108,8 @@ async fn forms_that_there_are_not_are_refused_before_anything_is_asked() {
         "text/csv;q=x",
         "a/b;q=0.1,".repeat(1000).as_str(),
     ] {
-        let answer = app.get_with("/api/products/sst/point?lon=1&lat=2", &[("accept", header)]);
-        assert_eq!(answer.await.header("content-type"), "application/json");
+        let path = "/api/products/sst/point?lon=1&lat=2";
+        let answer = app.get_with(path, &[("accept", header)]).await;
+        assert_eq!(answer.header("content-type"), "application/json");
     }
 }

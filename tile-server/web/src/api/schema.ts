@@ -1701,6 +1701,11 @@ export interface components {
             uncorrelated_tg: number;
         };
         /**
+         * @description A form in which an answer about time travels.
+         * @enum {string}
+         */
+        RowsForm: "json" | "csv" | "arrow";
+        /**
          * @description How the value at a point is made.
          * @enum {string}
          */
@@ -2664,6 +2669,8 @@ export interface operations {
                 min_coverage?: number;
                 /** @description How cells on the coast count in statistics; `whole` unless told otherwise. */
                 cells?: components["schemas"]["Cells"];
+                /** @description Form of the answer: `json`, or its rows alone as `csv` or `arrow`, a file of Arrow; by the header `Accept` unless one is given. */
+                format?: components["schemas"]["RowsForm"];
                 /** @description Version, as answers name it; the newest unless one is given. */
                 manifest?: string;
             };
@@ -2704,6 +2711,8 @@ export interface operations {
                         /** @description One mean for each step in the period, in the order of time. */
                         series: components["schemas"]["RegionValue"][];
                     }) | components["schemas"]["StatisticsAnswer"];
+                    "text/csv": string;
+                    "application/vnd.apache.arrow.file": unknown;
                 };
             };
             /** @description A parameter is not valid, or missing; the reason says what would be */
@@ -3419,6 +3428,8 @@ export interface operations {
                 min_coverage?: number;
                 /** @description Figure of the earth for lengths; `wgs84` unless one is given. */
                 earth?: components["schemas"]["Earth"];
+                /** @description Form of the answer: `json`, or its rows alone as `csv` or `arrow`, a file of Arrow; by the header `Accept` unless one is given. */
+                format?: components["schemas"]["RowsForm"];
                 /** @description Version, as answers name it; the newest unless one is given. */
                 manifest?: string;
             };
@@ -3438,6 +3449,8 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["StatisticsAnswer"];
+                    "text/csv": string;
+                    "application/vnd.apache.arrow.file": unknown;
                 };
             };
             /** @description A parameter is not valid, or missing; the reason says what would be */
@@ -3513,6 +3526,8 @@ export interface operations {
                 to?: string;
                 /** @description What the value at the place is: that of its cell, or bilinear of the four around it; `cell` unless told otherwise. */
                 sampling?: components["schemas"]["Sampling"];
+                /** @description Form of the answer: `json`, or its rows alone as `csv` or `arrow`, a file of Arrow; by the header `Accept` unless one is given. */
+                format?: components["schemas"]["RowsForm"];
                 /** @description Version, as answers name it; the newest unless one is given. */
                 manifest?: string;
             };
@@ -3547,6 +3562,8 @@ export interface operations {
                         /** @description One value for each step, in the order of time. */
                         series: components["schemas"]["PointValue"][];
                     }) | components["schemas"]["StatisticsAnswer"];
+                    "text/csv": string;
+                    "application/vnd.apache.arrow.file": unknown;
                 };
             };
             /** @description A parameter is not valid, or missing; the reason says what would be */
@@ -4543,6 +4560,7 @@ export const platformKindValues: ReadonlyArray<FlattenedDeepRequired<components>
 export const platformsTypeValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["Platforms"]["type"]> = ["FeatureCollection"];
 export const qualityValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["Quality"]> = ["good", "not_evaluated", "questionable", "bad"];
 export const quantityOneOf0Values: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["Quantity"]> = ["carbon_flux", "accumulated_carbon", "sea_surface_temperature", "sea_surface_skin_temperature", "sea_surface_subskin_temperature", "sea_surface_foundation_temperature", "chlorophyll", "wind_speed", "pco2", "fco2", "salinity", "air_pressure", "ice_fraction", "wave_height", "precipitation", "current", "elevation", "sea_area_fraction", "land_area_fraction"];
+export const rowsFormValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["RowsForm"]> = ["json", "csv", "arrow"];
 export const samplingValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["Sampling"]> = ["cell", "bilinear"];
 export const scaleValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["Scale"]> = ["linear", "log"];
 export const timeStepValues: ReadonlyArray<FlattenedDeepRequired<components>["schemas"]["TimeStep"]> = ["native", "day", "week", "month", "season", "year", "total"];
