@@ -19,8 +19,9 @@ use quick_cache::sync::Cache;
 
 use crate::backend::{Analyse, MadeOfSeries};
 use crate::catalogue::Layer;
+use crate::client::Client;
 use crate::error::ServerError;
-use crate::gate::Gate;
+use crate::fair_gate::FairGate;
 use crate::metrics::Metrics;
 use crate::single_flight::SingleFlight;
 
@@ -77,7 +78,7 @@ fn budget_key(layer: &Layer, query: &BudgetQuery) -> Digest {
 /// The analyses of one server.
 pub struct Analyses {
     analyst: Arc<dyn Analyse>,
-    gate: Gate,
+    gate: FairGate,
     metrics: Metrics,
     budgets: Answers<BudgetAnswer>,
     histories: Answers<BudgetHistory>,
@@ -118,21 +119,22 @@ impl<T: Send + Sync + 'static> Answers<T> {
         }
     }
 
-    /// The answer to a question: one that is remembered, or `computed` behind the gate, once for all who ask meanwhile.
+    /// The answer to a question: one that is remembered, or `computed` behind the gate, once for all who ask meanwhile;
+    /// the turn is that of whoever asked first.
     async fn answer<E: Into<ServerError> + Send + 'static>(
         &self,
         key: Digest,
-        gate: &Gate,
+        gate: &FairGate,
         metrics: &Metrics,
         computed: impl Future<Output = Result<T, E>> + Send + 'static,
     ) -> Result<Arc<T>, ServerError> {
         if let Some(answer) = self.remembered.get(&key) {
             return Ok(answer);
         }
-        let (gate, metrics) = (gate.clone(), metrics.clone());
+        let (gate, client, metrics) = (gate.clone(), Client::asking(), metrics.clone());
         let behind_the_gate = || async move {
             let _pass = gate
-                .enter()
+                .enter(client)
                 .await
                 .inspect_err(|_busy| metrics.refused.inc())?;
             Ok(Arc::new(computed.await.map_err(Into::into)?))
@@ -145,7 +147,7 @@ impl<T: Send + Sync + 'static> Answers<T> {
 
 impl Analyses {
     /// Nothing computed yet.
-    pub fn new(analyst: Arc<dyn Analyse>, gate: Gate, metrics: Metrics) -> Self {
+    pub(crate) fn new(analyst: Arc<dyn Analyse>, gate: FairGate, metrics: Metrics) -> Self {
         Self {
             analyst,
             gate,

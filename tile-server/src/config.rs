@@ -4,6 +4,8 @@ use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::num::NonZeroU32;
 use std::path::PathBuf;
 
+use axum::http::HeaderName;
+
 const LISTEN: SocketAddr = SocketAddr::new(IpAddr::V4(Ipv4Addr::LOCALHOST), 8080);
 const TILE_MEMORY_BYTES: u64 = 256 << 20;
 /// Some 200,000 tiles.
@@ -11,7 +13,7 @@ const STORED_BYTES_PER_DAY: u64 = 4 << 30;
 const MOST_DRAWS_AT_ONCE: u32 = 1024;
 const DRAW_QUEUE: u32 = 256;
 const ANALYSES_AT_ONCE: u32 = 2;
-const ANALYSIS_QUEUE: u32 = 64;
+const ANALYSIS_QUEUE: u32 = 1024;
 const REQUEST_LIMIT_S: u64 = 60;
 const DRAIN_LIMIT_S: u64 = 10;
 const CATALOGUE_AGE_MS: u64 = 1000;
@@ -46,9 +48,14 @@ pub struct Settings {
     /// Series and budgets computed at the same time, and as many questions about observations, 1 to 1024
     #[arg(long, env = "FLUXGLOBE_ANALYSES_AT_ONCE", default_value_t = ANALYSES_AT_ONCE, value_parser = clap::value_parser!(u32).range(1..=1024))]
     pub analyses_at_once: u32,
-    /// Series and budgets, and as many questions about observations, that may wait before clients are sent away, 0 to 65536
+    /// Series and budgets, and as many questions about observations, that may wait before clients are sent away, 0 to 65536; one client's
+    /// series and budgets at most half of them. Clients take turns, each with the question that it asked first
     #[arg(long, env = "FLUXGLOBE_ANALYSIS_QUEUE", default_value_t = ANALYSIS_QUEUE, value_parser = clap::value_parser!(u32).range(0..=65_536))]
     pub analysis_queue: u32,
+    /// Header in which a proxy in front says who asks, such as x-forwarded-for: its last address counts, and clients must not reach the
+    /// server past the proxy. Absent, the address of the connection stands for a client
+    #[arg(long, env = "FLUXGLOBE_CLIENT_HEADER", value_name = "NAME")]
+    pub client_header: Option<HeaderName>,
     /// Longest time until an answer begins, seconds, 1 to 3600
     #[arg(long, env = "FLUXGLOBE_REQUEST_LIMIT_S", default_value_t = REQUEST_LIMIT_S, value_parser = clap::value_parser!(u64).range(1..=3600))]
     pub request_limit_s: u64,
@@ -83,6 +90,7 @@ impl Default for Settings {
             draw_queue: DRAW_QUEUE,
             analyses_at_once: ANALYSES_AT_ONCE,
             analysis_queue: ANALYSIS_QUEUE,
+            client_header: None,
             request_limit_s: REQUEST_LIMIT_S,
             drain_limit_s: DRAIN_LIMIT_S,
             catalogue_age_ms: CATALOGUE_AGE_MS,

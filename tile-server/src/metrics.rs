@@ -71,6 +71,8 @@ pub struct Metrics {
     pub send_duration_s: HistogramVec,
     /// Requests sent away because too many waited.
     pub refused: IntCounter,
+    /// Questions that wait for their turn to be worked at.
+    pub analyses_waiting: IntGauge,
     /// Pictures that were drawn and not stored, by why not.
     pub not_stored: IntCounterVec,
     /// Failed reads of the store.
@@ -161,6 +163,7 @@ impl Metrics {
                 "refused_total",
                 "Requests sent away because too many waited.",
             )?,
+            analyses_waiting: gauge("analyses_waiting", "Questions that wait for their turn.")?,
             not_stored: counters(
                 "not_stored_total",
                 "Pictures drawn and not stored.",

@@ -14,6 +14,7 @@ use tower_http::compression::CompressionLayer;
 use tower_http::compression::predicate::{DefaultPredicate, NotForContentType, Predicate};
 use tower_http::cors::{Any, CorsLayer};
 
+use crate::client;
 use crate::error::ServerError;
 use crate::middleware::{body, panics::CountPanics, security, track};
 use crate::routes::picture::{COVERED, HEIGHTS_END, HEIGHTS_WITHIN, SHOWN_TIME, TILT_WITH_GROUND};
@@ -59,7 +60,8 @@ pub fn router(state: AppState) -> Router {
         )))
         .layer(HandleErrorLayer::new(timed_out))
         .layer(TimeoutLayer::new(Duration::from_secs(limit_s)))
-        .layer(from_fn(body::limit));
+        .layer(from_fn(body::limit))
+        .layer(from_fn_with_state(state.clone(), client::remember));
     Router::new()
         .route("/tiles/{product}/{mode_json}", get(tilejson::get))
         .route("/tiles/{product}/{mode}/{z}/{x}/{y_png}", get(tiles::get))

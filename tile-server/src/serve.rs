@@ -6,11 +6,13 @@ use std::io::ErrorKind;
 use std::net::SocketAddr;
 use std::time::Duration;
 
+use axum::extract::Request;
 use axum::serve::IncomingStream;
 use tokio::net::TcpListener;
 use tokio::sync::watch;
 use tower::{ServiceBuilder, service_fn};
 
+use crate::client::Client;
 use crate::config::Settings;
 use crate::connections::Door;
 use crate::error::ServeError;
@@ -78,7 +80,14 @@ impl Server {
         // The service of one connection, which is told while an answer is worked at.
         let service = service_fn(move |connection: IncomingStream<'_, Door>| {
             let answers = connection.io().answers();
-            let counted = ServiceBuilder::new().map_future(move |one| answers.counting(one));
+            let client = Client::at(*connection.remote_addr());
+            let with_client = move |mut request: Request| {
+                request.extensions_mut().insert(client);
+                request
+            };
+            let counted = ServiceBuilder::new()
+                .map_request(with_client)
+                .map_future(move |one| answers.counting(one));
             ready(Ok::<_, Infallible>(counted.service(routes.clone())))
         });
         let serving = axum::serve(door, service).with_graceful_shutdown(until_told);

@@ -14,6 +14,7 @@ use crate::catalogue::Catalogue;
 use crate::config::Settings;
 use crate::cubes::Cubes;
 use crate::error::ServeError;
+use crate::fair_gate::FairGate;
 use crate::gate::Gate;
 use crate::live::{Freshness, HotTiles, News};
 use crate::metrics::{Metrics, Registry};
@@ -77,7 +78,11 @@ impl AppState {
             .draws_at_once
             .unwrap_or_else(|| drawer.draws_at_once());
         let draws = Gate::new(at_once.get(), settings.draw_queue);
-        let analyses = Gate::new(settings.analyses_at_once, settings.analysis_queue);
+        let analyses = FairGate::new(
+            settings.analyses_at_once,
+            settings.analysis_queue,
+            metrics.analyses_waiting.clone(),
+        );
         let max_age = Duration::from_millis(settings.catalogue_age_ms);
         let limits = Limits {
             memory_bytes: settings.tile_memory_bytes,

@@ -17,6 +17,7 @@ use serde_json::Value;
 use storage::{Store, domain, fields, manifests};
 use tile_server::metrics::Registry;
 use tile_server::{AppState, Settings, router};
+use tokio::sync::Semaphore;
 use tower::ServiceExt as _;
 
 use crate::doubles::{Analyst, Drawer, Observer};
@@ -98,13 +99,31 @@ impl TestApp {
         Self::over(Store::memory(), change)
     }
 
+    /// A server whose analyst is slow: each series of a place waits for one of `turns`.
+    pub(crate) async fn with_turns(
+        turns: Arc<Semaphore>,
+        change: impl FnOnce(&mut Settings),
+    ) -> Self {
+        let analyst = Analyst {
+            turns: Some(turns),
+            ..Analyst::default()
+        };
+        let app = Self::asking(Arc::new(analyst), Store::memory(), change);
+        app.land("flux", Quantity::CarbonFlux, 1).await;
+        app
+    }
+
     pub(crate) fn over(store: Store, change: impl FnOnce(&mut Settings)) -> Self {
+        Self::asking(Arc::default(), store, change)
+    }
+
+    fn asking(analyst: Arc<Analyst>, store: Store, change: impl FnOnce(&mut Settings)) -> Self {
         let mut settings = Settings {
             catalogue_age_ms: 0,
             ..Settings::default()
         };
         change(&mut settings);
-        let (drawer, analyst) = (Arc::new(Drawer::over(&store)), Arc::new(Analyst::default()));
+        let (drawer, analyst) = (Arc::new(Drawer::over(&store)), analyst);
         let state = AppState::new(
             &settings,
             store.clone(),

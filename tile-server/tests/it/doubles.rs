@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::num::NonZeroU32;
+use std::sync::Arc;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
@@ -226,6 +227,8 @@ pub(crate) struct Analyst {
     pub(crate) made: Mutex<Vec<SeriesQuestion>>,
     pub(crate) check: Mutex<Option<Check>>,
     pub(crate) mood: Mutex<Mood>,
+    /// Series of places wait for one of these each, if there are any.
+    pub(crate) turns: Option<Arc<Semaphore>>,
 }
 
 impl Analyst {
@@ -247,6 +250,9 @@ impl Analyse for Analyst {
         place: LonLatDeg,
     ) -> Result<PointSeries, BackendError> {
         self.points.lock().unwrap().push(place);
+        if let Some(turns) = &self.turns {
+            turns.acquire().await.unwrap().forget();
+        }
         self.mood().apply()?;
         let (row, col) = manifest.cell_inside(place).unwrap();
         let is_sum = manifest.quantity == Quantity::AccumulatedCarbon;

@@ -1,13 +1,15 @@
 //! What happens when there is too much to do, when something takes too long, and when something breaks.
 
 use std::num::NonZeroU32;
+use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use axum::body::Body;
-use axum::http::{Request, StatusCode};
-use futures::FutureExt as _;
+use axum::http::{HeaderName, Request, StatusCode};
+use futures::FutureExt;
 use tile_server::backend::{BackendError, Class};
+use tokio::sync::Semaphore;
 
 use crate::app::{Answer, TestApp};
 use crate::doubles::Mood;
@@ -122,6 +124,88 @@ async fn as_many_are_drawn_at_once_as_were_asked_for_or_as_suit_the_drawer() {
         }
         assert_eq!(app.drawer.drawn_count(), 4);
     }
+}
+
+/// Asks for the series of a column's cell as somebody.
+async fn asked(app: &TestApp, somebody: &str, col: u32) -> Answer {
+    let lon = f64::from(col) * 10.0 - 175.0;
+    let path = format!("/api/products/flux/point?lon={lon}&lat=5");
+    app.get_with(&path, &[("x-forwarded-for", somebody)]).await
+}
+
+/// Goes on with those who ask until so many of them wait for a turn and so many were worked at.
+async fn until(app: &TestApp, all: &mut [impl Future<Output = Answer> + Unpin], wanted: [u64; 2]) {
+    let waited = async {
+        loop {
+            for one in &mut *all {
+                assert!(one.now_or_never().is_none());
+            }
+            let waiting = app.metric("fluxglobe_tile_server_analyses_waiting").await;
+            let asked = app.analyst.points.lock().unwrap().len() as u64;
+            if [waiting, asked] == wanted {
+                return;
+            }
+            tokio::task::yield_now().await;
+        }
+    };
+    let limit = Duration::from_mins(1);
+    assert!(
+        tokio::time::timeout(limit, waited).await.is_ok(),
+        "{wanted:?} never came"
+    );
+}
+
+#[tokio::test]
+async fn who_asks_for_one_series_beside_somebody_who_asks_for_many_waits_for_one_of_them() {
+    let turns = Arc::new(Semaphore::new(0));
+    let app = TestApp::with_turns(Arc::clone(&turns), |settings| {
+        (settings.analyses_at_once, settings.analysis_queue) = (1, 12);
+        settings.client_header = Some(HeaderName::from_static("x-forwarded-for"));
+    })
+    .await;
+    let many = "203.0.113.9, 192.0.2.1";
+    let mut all = vec![];
+    for col in 0..7 {
+        all.push(asked(&app, many, col).boxed_local());
+        until(&app, &mut all, [col.into(), 1]).await;
+    }
+    // One is worked at, six wait: half of the queue. Who says to be somebody else in front of the proxy is not.
+    let path = "/api/products/flux/point?lon=175&lat=5";
+    let too_many = app.get_with(path, &[("x-forwarded-for", "192.0.2.77, 192.0.2.1")]);
+    assert_eq!(too_many.await.status, StatusCode::SERVICE_UNAVAILABLE);
+    all.push(asked(&app, "192.0.2.2", 30).boxed_local());
+    until(&app, &mut all, [7, 1]).await;
+    turns.add_permits(8);
+    let answers = futures::future::join_all(all).await;
+    assert!(answers.iter().all(|answer| answer.status == StatusCode::OK));
+    let order: Vec<f64> = app
+        .analyst
+        .points
+        .lock()
+        .unwrap()
+        .iter()
+        .map(|place| place.lon)
+        .collect();
+    assert_eq!(order[..4], [-175.0, -165.0, 125.0, -155.0], "{order:?}");
+}
+
+#[tokio::test]
+async fn a_thousand_questions_at_once_are_computed_once_each_and_all_answered() {
+    let turns = Arc::new(Semaphore::new(0));
+    let app = TestApp::with_turns(Arc::clone(&turns), |settings| {
+        settings.client_header = Some(HeaderName::from_static("x-forwarded-for"));
+    })
+    .await;
+    let somebody: Vec<String> = (0..10).map(|last| format!("192.0.2.{last}")).collect();
+    // Ten clients ask for the same ten places a hundred times.
+    let all = (0..1000).map(|at: u32| asked(&app, &somebody[at as usize % 10], at % 10));
+    let mut all: Vec<_> = all.map(FutureExt::boxed_local).collect();
+    until(&app, &mut all, [8, 2]).await;
+    turns.add_permits(10);
+    let answers = futures::future::join_all(all).await;
+    assert!(answers.iter().all(|answer| answer.status == StatusCode::OK));
+    assert_eq!(app.analyst.points.lock().unwrap().len(), 10);
+    assert_eq!(app.metric("fluxglobe_tile_server_refused_total").await, 0);
 }
 
 #[tokio::test]
