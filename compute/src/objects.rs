@@ -6,6 +6,7 @@ use std::sync::Arc;
 use bytes::Bytes;
 use contract::digest::Digest;
 use contract::key::ObjectKey;
+use contract::manifest::ManifestId;
 use datafusion::error::DataFusionError;
 use datafusion::execution::runtime_env::RuntimeEnv;
 use object_store::path::Path;
@@ -13,11 +14,12 @@ use object_store::{ObjectStore, ObjectStoreExt as _};
 use quick_cache::Weighter;
 use quick_cache::sync::Cache;
 use storage::rows::{RowIndex, Stored};
-use storage::{StorageError, Store};
+use storage::{StorageError, Store, manifests};
 use tokio::sync::Semaphore;
 use url::{Position, Url};
 
 use crate::ComputeError;
+use crate::open_versions::OpenVersions;
 use crate::reduce::remembered::Remembered;
 use crate::region::computed::ComputedWeights;
 use crate::region::extent::Extent;
@@ -35,6 +37,7 @@ pub struct Objects {
     row_indexes: Arc<Cache<Path, Option<Arc<RowIndex>>, ByRows>>,
     extents: Arc<Cache<Digest, Extent>>,
     sums: Arc<Remembered>,
+    open_versions: Arc<OpenVersions>,
     /// Where functions that compute products store them.
     storing: Option<Storing>,
 }
@@ -105,6 +108,7 @@ impl Objects {
             row_indexes: Arc::new(Cache::with_weighter(HELD_INDEXES, HELD_ROWS, ByRows)),
             extents: Arc::new(Cache::new(HELD_EXTENTS)),
             sums: Arc::default(),
+            open_versions: Arc::new(OpenVersions::new()),
             storing: None,
         }
     }
@@ -199,6 +203,31 @@ impl Objects {
     /// Sums that were found before.
     pub(crate) fn remembered(&self) -> &Remembered {
         &self.sums
+    }
+
+    /// Versions whose values along time are held.
+    pub(crate) fn open_versions(&self) -> &OpenVersions {
+        &self.open_versions
+    }
+
+    /// Values of a version along time, by its name: for who is sent a piece of a question about it. None where these objects
+    /// have no store that versions are read from.
+    ///
+    /// # Errors
+    /// A store that does not answer; a manifest or cube that cannot be read.
+    pub(crate) async fn values(
+        &self,
+        id: &ManifestId,
+    ) -> Result<Option<cube::Values>, ComputeError> {
+        let Some(Storing { store, .. }) = &self.storing else {
+            return Ok(None);
+        };
+        if let Some(held) = self.open_versions.held(id) {
+            return Ok(Some(held));
+        }
+        let manifest = manifests::load(store, id).await?;
+        let opened = self.open_versions.values(store, &manifest, id).await?;
+        Ok(Some(opened))
     }
 
     /// Extents of regions by the digest of the region and of how it is measured.

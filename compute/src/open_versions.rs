@@ -18,6 +18,11 @@ impl OpenVersions {
         Self(Cache::new(VERSIONS))
     }
 
+    /// Values of a version, if they are held.
+    pub(crate) fn held(&self, id: &ManifestId) -> Option<Values> {
+        self.0.get(id)
+    }
+
     /// Values of a version, opened now if they are not held.
     pub(crate) async fn values(
         &self,
@@ -25,7 +30,7 @@ impl OpenVersions {
         manifest: &Manifest,
         id: &ManifestId,
     ) -> Result<Values, CubeError> {
-        if let Some(values) = self.0.get(id) {
+        if let Some(values) = self.held(id) {
             return Ok(values);
         }
         let values = Values::of(store, &Arc::new(manifest.clone())).await?;
@@ -45,5 +50,11 @@ impl OpenVersions {
     /// Lets go of a version; false if it was not held.
     pub(crate) fn forget(&self, id: &ManifestId) -> bool {
         self.0.remove(id).is_some()
+    }
+}
+
+impl std::fmt::Debug for OpenVersions {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} open versions", self.0.len())
     }
 }

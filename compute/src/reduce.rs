@@ -27,5 +27,6 @@ mod weighed;
 
 pub use answer::{statistics, statistics_of};
 pub(crate) use over_steps::{RegionOnGrid, sums_over_region};
+pub(crate) use percentiles::least_part;
 pub(crate) use region_sums::RegionStepSums;
 pub(crate) use tasks::are_fields_less;

@@ -20,7 +20,6 @@ use tokio::sync::OnceCell;
 use tokio::time::Instant;
 
 use crate::cluster::{self, Cluster, SchedulerUrl};
-use crate::open_versions::OpenVersions;
 use crate::standalone::{self, WorkFolder, WorkLease};
 use crate::{ComputeError, Objects, state};
 
@@ -28,7 +27,6 @@ use crate::{ComputeError, Objects, state};
 #[derive(Clone)]
 pub struct Engine {
     inner: Arc<Inner>,
-    open_versions: Arc<OpenVersions>,
     /// May a question about a region leave its weights in the store?
     stores_weights: bool,
 }
@@ -135,7 +133,8 @@ impl Engine {
         })
     }
 
-    /// The same engine, its queries in this process taking no more memory than this for what they must hold.
+    /// The same engine, its work in this process taking no more memory than this for what it must hold: values in flight, cells over all
+    /// time, sorted rows.
     #[must_use]
     pub fn with_memory_bytes(self, memory_bytes: usize) -> Self {
         let inner = &self.inner;
@@ -198,7 +197,6 @@ impl Engine {
     fn of(inner: Inner) -> Self {
         Self {
             inner: Arc::new(inner),
-            open_versions: Arc::new(OpenVersions::new()),
             stores_weights: true,
         }
     }
@@ -218,19 +216,25 @@ impl Engine {
         id: &'a ManifestId,
     ) -> BoxFuture<'a, Result<cube::Values, ComputeError>> {
         Box::pin(async move {
-            let opened = self.open_versions.values(self.store(), manifest, id);
+            let held = self.objects().open_versions();
+            let opened = held.values(self.store(), manifest, id);
             Ok(opened.await?)
         })
     }
 
     /// Lets go of a version's values; false if they were not held.
     pub(crate) fn forget_values(&self, id: &ManifestId) -> bool {
-        self.open_versions.forget(id)
+        self.objects().open_versions().forget(id)
     }
 
     /// Where its queries read objects.
     pub(crate) fn objects(&self) -> &Objects {
         &self.inner.objects
+    }
+
+    /// Memory that its work in this process may take, bytes.
+    pub(crate) fn memory_bytes(&self) -> usize {
+        self.inner.memory_bytes
     }
 
     /// Parts that a question is cut into.

@@ -84,7 +84,10 @@ pub(crate) async fn needed_log(
 pub(crate) fn engine(settings: &Settings, store: Store) -> Result<Engine> {
     match &settings.cluster {
         Some(scheduler) => cluster(settings, store, scheduler),
-        None => Ok(Engine::standalone(store, parts_in_process(settings, false))),
+        None => {
+            let engine = Engine::standalone(store, parts_in_process(settings, false));
+            Ok(engine.with_memory_bytes((settings.memory_mib as usize) << 20))
+        }
     }
 }
 
@@ -100,7 +103,7 @@ pub(crate) fn region_engine(settings: &Settings, store: Store) -> Result<Engine>
 /// DataFusion in this process, whatever cluster there is.
 pub(crate) fn in_process(settings: &Settings, store: Store) -> Engine {
     let parts = parts_in_process(settings, store.is_remote());
-    Engine::in_process(store, parts)
+    Engine::in_process(store, parts).with_memory_bytes((settings.memory_mib as usize) << 20)
 }
 
 /// The Ballista cluster of a scheduler.

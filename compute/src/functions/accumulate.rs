@@ -1,4 +1,5 @@
-//! `accumulate(task)`: what a task accumulates over the values that it reads by itself, as bytes (`reduce::task`).
+//! `accumulate(task)`: what a task accumulates over the values that it reads by itself, as bytes (`reduce::task`); NULL
+//! where this process does not find them as the task says.
 //!
 //! The task names objects, rows and weights by their addresses: neither values nor weights are in any plan.
 
@@ -65,9 +66,9 @@ impl AsyncScalarUDFImpl for Accumulate {
         for row in 0..tasks.len() {
             let task = Task::of_text(tasks.value(row)).map_err(external)?;
             let accumulated = task.run(&self.objects).await.map_err(external)?;
-            parts.push(accumulated.to_bytes());
+            parts.push(accumulated.map(|own| own.to_bytes()));
         }
-        let parts = BinaryArray::from_iter_values(parts);
+        let parts = BinaryArray::from_iter(parts);
         Ok(ColumnarValue::Array(Arc::new(parts)))
     }
 }

@@ -1,5 +1,5 @@
 //! `merge_accumulated(part)`: what several tasks accumulated, in any order, as one: an aggregate function over the bytes that
-//! `accumulate` gives.
+//! `accumulate` gives; NULL as soon as one of them is.
 
 use std::mem::size_of;
 use std::sync::Arc;
@@ -43,7 +43,7 @@ impl AggregateUDFImpl for MergeAccumulated {
     }
 
     fn state_fields(&self, args: StateFieldsArgs<'_>) -> Result<Vec<FieldRef>> {
-        let field = Field::new(args.name, DataType::Binary, false);
+        let field = Field::new(args.name, DataType::Binary, true);
         Ok(vec![Arc::new(field)])
     }
 
@@ -55,13 +55,15 @@ impl AggregateUDFImpl for MergeAccumulated {
 #[derive(Debug, Default)]
 struct Merged {
     all: Accumulated,
+    /// A part is missing.
+    is_in_part: bool,
     /// Bytes of what was merged last, a measure of what is held.
     size_bytes: usize,
 }
 
 impl Merged {
     fn bytes(&self) -> ScalarValue {
-        ScalarValue::Binary(Some(self.all.to_bytes()))
+        ScalarValue::Binary((!self.is_in_part).then(|| self.all.to_bytes()))
     }
 }
 
@@ -69,6 +71,7 @@ impl Accumulator for Merged {
     fn update_batch(&mut self, arguments: &[ArrayRef]) -> Result<()> {
         let external = |e: crate::ComputeError| DataFusionError::External(e.into());
         let parts = arguments[0].as_binary::<i32>();
+        self.is_in_part |= parts.null_count() > 0;
         for part in parts.iter().flatten() {
             let part = Accumulated::of_bytes(part).map_err(external)?;
             self.all.merge(part).map_err(external)?;

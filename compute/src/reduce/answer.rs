@@ -18,7 +18,7 @@ use super::accumulator::{Accumulated, too_large};
 use super::bins::{BinSums, bin_sums};
 use super::percentiles::Searches;
 use super::question::{Question, Wanted};
-use super::run::{opened, run};
+use super::run::{changed_meanwhile, run};
 use super::tasks::Version;
 use super::weighed::Weighed;
 use crate::budget::rows::coverage_percent;
@@ -52,7 +52,7 @@ pub fn statistics_of<'a>(
             engine,
             manifest,
             id: &id,
-            values: opened(engine, manifest, &id).await?,
+            values: engine.values(manifest, &id).await?,
             weighed: &weighed,
             steps: first as u32..(first + inside.len()) as u32,
             scale: Scale::of_all(),
@@ -148,8 +148,8 @@ struct Reduction<'a> {
     manifest: &'a Manifest,
     /// The name of the version, which is costly to compute.
     id: &'a ManifestId,
-    /// The version along time, where this process reads it.
-    values: Option<Values>,
+    /// The version along time.
+    values: Values,
     weighed: &'a Weighed,
     /// Steps that reach into the period.
     steps: Range<u32>,
@@ -165,10 +165,11 @@ impl Reduction<'_> {
             store: self.engine.store(),
             manifest: self.manifest,
             id: self.id,
-            values: self.values.as_ref(),
+            values: Some(&self.values),
         };
         let [whole, covered] = weighed.addresses.clone();
         let question = Question {
+            version: self.id.clone(),
             shape: weighed.shape,
             whole,
             covered,
@@ -191,8 +192,11 @@ impl Reduction<'_> {
             new.extend(name.map(|name| (name, run.steps)));
         }
         if !pieces.is_empty() {
-            let values = self.values.clone();
-            all.merge(run(self.engine, question, values, pieces).await?)?;
+            let values = Some(self.values.clone());
+            let Some(found) = run(self.engine, question.clone(), values, pieces).await? else {
+                return self.of_fields_alone(version, question).await;
+            };
+            all.merge(found)?;
         }
         for (name, steps) in new {
             let own = all.steps.range(steps.clone());
@@ -200,6 +204,22 @@ impl Reduction<'_> {
             known.insert(name, own.collect());
         }
         Ok(all)
+    }
+
+    /// The same of fields alone, which never change.
+    async fn of_fields_alone(
+        &self,
+        version: Version<'_>,
+        question: Question,
+    ) -> Result<Accumulated, ComputeError> {
+        let fields = Version {
+            values: None,
+            ..version
+        };
+        let runs = fields.runs(self.steps.clone(), &self.weighed.cells(), None);
+        let pieces = runs.into_iter().flat_map(|run| run.pieces).collect();
+        let found = run(self.engine, question, None, pieces).await?;
+        found.ok_or_else(changed_meanwhile)
     }
 
     /// The scale of the values that there are, of a quantity that says nothing of them.

@@ -18,6 +18,16 @@ pub(super) struct InsideRun {
 }
 
 impl InsideRun {
+    /// These blocks, none of them on a coast.
+    #[cfg(test)]
+    pub(super) fn over(blocks: std::ops::RangeInclusive<u32>) -> Self {
+        Self {
+            first: *blocks.start(),
+            last: *blocks.end(),
+            coast: vec![],
+        }
+    }
+
     /// Records of sums that are read of it at most.
     pub(super) fn record_count(&self) -> usize {
         2 + self.coast.len()

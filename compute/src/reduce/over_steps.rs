@@ -9,7 +9,7 @@ use cube::weight_unit::WeightUnit;
 use super::cells::Cells;
 use super::question::{Question, Wanted};
 use super::region_sums::RegionStepSums;
-use super::run::{opened, run};
+use super::run::{changed_meanwhile, run};
 use super::tasks::Version;
 use crate::budget::Measure;
 use crate::region::loaded::RegionWeights;
@@ -44,12 +44,12 @@ pub(crate) async fn sums_over_region(
     };
     let at: Vec<usize> = steps.iter().map(at).collect::<Result<_, _>>()?;
     let id = manifest.id();
-    let values = opened(engine, manifest, &id).await?;
+    let values = engine.values(manifest, &id).await?;
     let version = Version {
         store: engine.store(),
         manifest,
         id: &id,
-        values: values.as_ref(),
+        values: Some(&values),
     };
     let shape = [manifest.grid.rows, manifest.grid.cols];
     let unit = WeightUnit::default();
@@ -61,6 +61,7 @@ pub(crate) async fn sums_over_region(
     };
     let [whole, covered] = region.addresses.clone();
     let question = Question {
+        version: id.clone(),
         shape,
         whole,
         covered,
@@ -75,9 +76,22 @@ pub(crate) async fn sums_over_region(
     // Runs are read whole: what is asked for in pieces is summed in pieces, or a step would count twice.
     for together in at.chunk_by(|before, next| before + 1 == *next) {
         let asked = together[0] as u32..together[0] as u32 + together.len() as u32;
-        let pieces = version.runs(asked.clone(), &cells, None).into_iter();
-        let pieces = pieces.flat_map(|run| run.pieces).collect();
-        let found = run(engine, question.clone(), values.clone(), pieces).await?;
+        let pieces = |version: Version<'_>| {
+            let runs = version.runs(asked.clone(), &cells, None).into_iter();
+            runs.flat_map(|run| run.pieces).collect()
+        };
+        let along_time = pieces(version);
+        let along_time = run(engine, question.clone(), Some(values.clone()), along_time);
+        let found = if let Some(found) = along_time.await? {
+            found
+        } else {
+            let fields = Version {
+                values: None,
+                ..version
+            };
+            let found = run(engine, question.clone(), None, pieces(fields)).await?;
+            found.ok_or_else(changed_meanwhile)?
+        };
         let mut found = found.regions;
         for step in asked {
             let own = found.remove(&step);

@@ -59,7 +59,7 @@ impl Searches {
                 low: number_of(bin.sums.min),
                 high: number_of(bin.sums.max),
                 below: 0,
-                target: target(bin.sums.weight, *percentile),
+                target: least_part(bin.sums.weight, *percentile),
             };
             all.extend(percentiles.iter().map(search));
         }
@@ -128,7 +128,7 @@ impl Searches {
 }
 
 /// The least weight that is so large a share of all; a step of it at least.
-fn target(weight: i128, percentile: Percentile) -> i128 {
+pub(crate) fn least_part(weight: i128, percentile: Percentile) -> i128 {
     let (part, whole) = percentile.share();
     let (part, whole) = (i128::from(part), i128::from(whole));
     // In two parts, neither of which leaves 128 bits.
@@ -207,7 +207,7 @@ mod tests {
 
     #[test]
     fn targets_are_rounded_up_and_do_not_overflow() {
-        let of = |weight, percentile: &str| target(weight, percentile.parse().unwrap());
+        let of = |weight, percentile: &str| least_part(weight, percentile.parse().unwrap());
         assert_eq!((of(10, "50"), of(11, "50"), of(10, "0")), (5, 6, 1));
         assert_eq!(of(1 << 120, "100"), 1 << 120);
         assert_eq!(of(1 << 120, "50"), 1 << 119);

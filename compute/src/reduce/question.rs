@@ -3,10 +3,13 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
+use contract::chunk::{CHUNK_COLS, CHUNK_ROWS};
 use contract::digest::Digest;
 use contract::grid::Grid;
 use contract::key::ObjectKey;
+use contract::manifest::ManifestId;
 use contract::time::Period;
+use cube::BLOCK_CELLS;
 use cube::scale::Scale;
 use cube::weight_unit::WeightUnit;
 use serde::{Deserialize, Serialize};
@@ -16,9 +19,24 @@ use super::histogram::Buckets;
 use super::inside::InsideRun;
 use crate::budget::Measure;
 
+/// What it costs to open one more file, in bytes read.
+pub(super) const OPEN_BYTES: u64 = 64 << 10;
+/// Bytes of a record of sums, before compression.
+pub(super) const RECORD_BYTES: u64 = 6 << 10;
+/// Bytes of a chunk of a field, before compression.
+pub(super) const CHUNK_BYTES: u64 = CHUNK_ROWS as u64 * CHUNK_COLS as u64 * VALUE_BYTES;
+const VALUE_BYTES: u64 = size_of::<f32>() as u64;
+
+/// Bytes of a block in a run of so many steps, before compression.
+pub(super) fn block_bytes(steps: u64) -> u64 {
+    u64::from(BLOCK_CELLS * BLOCK_CELLS) * VALUE_BYTES * steps.max(1)
+}
+
 /// What is asked of every piece.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct Question {
+    /// The version whose values are reduced.
+    pub(super) version: ManifestId,
     pub(super) shape: Shape,
     /// Address of the weights, or the question that they answer.
     pub(super) whole: String,
@@ -84,7 +102,7 @@ pub(super) enum Wanted {
 pub(super) struct Piece {
     /// Name of the object; of blocks that of the field of their first step.
     pub(super) key: ObjectKey,
-    /// Where queries read it; nowhere in particular if it holds blocks.
+    /// Where queries read it; nowhere in particular if it is read along time.
     pub(super) address: String,
     pub(super) layout: Layout,
     /// Index of its first step in the version.
@@ -97,13 +115,34 @@ pub(super) struct Piece {
     pub(super) inside: Vec<InsideRun>,
 }
 
+impl Piece {
+    /// What it takes to read and reduce it, in bytes before compression: pieces are dealt out by that.
+    pub(super) fn cost_bytes(&self) -> u64 {
+        let steps = u64::from(self.steps.end - self.steps.start);
+        match self.layout {
+            Layout::Blocks => self.rows.len() as u64 * block_bytes(steps),
+            Layout::Sums => {
+                let records = self.inside.iter().map(InsideRun::record_count);
+                records.sum::<usize>() as u64 * RECORD_BYTES
+            }
+            Layout::Field(_) => self.rows.len() as u64 * CHUNK_BYTES + OPEN_BYTES,
+        }
+    }
+
+    /// Its steps by their index in the version.
+    pub(super) fn of_version(&self) -> Range<usize> {
+        let [start, end] = [self.steps.start, self.steps.end].map(|step| self.first_step + step);
+        start as usize..end as usize
+    }
+}
+
 /// How values lie where they are read.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(super) enum Layout {
-    /// Time-major: a row a block, `[cell, step]`. Only a process that has opened the version reads it.
+    /// Time-major: a row a block, `[cell, step]`.
     Blocks,
-    /// Stored sums of blocks. Only a process that has opened the version reads them.
+    /// Stored sums of blocks.
     Sums,
     /// A row a chunk of one step.
     Field(Period),

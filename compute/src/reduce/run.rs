@@ -6,7 +6,6 @@ use std::collections::BTreeSet;
 
 use contract::digest::Digest;
 use contract::key::ObjectKey;
-use contract::manifest::{Manifest, ManifestId};
 use cube::Values;
 use datafusion::arrow::array::{Array as _, AsArray as _, RecordBatch};
 use futures::{StreamExt as _, TryStreamExt as _, stream};
@@ -14,34 +13,32 @@ use futures::{StreamExt as _, TryStreamExt as _, stream};
 use super::accumulator::Accumulated;
 use super::question::{Piece, Question};
 use super::task::{Task, Worker};
+use super::tasks::PIECE_BYTES;
 use crate::scan;
 use crate::session::QueryContext;
 use crate::{ComputeError, Engine};
 
-/// What some pieces of a question come to.
+/// What some pieces of a question come to. None where executors did not find along time what these pieces were planned for: the
+/// question is to be asked of fields then.
 pub(super) async fn run(
     engine: &Engine,
     question: Question,
     values: Option<Values>,
     pieces: Vec<Piece>,
-) -> Result<Accumulated, ComputeError> {
+) -> Result<Option<Accumulated>, ComputeError> {
     if engine.is_distributed() {
         distributed(engine, question, pieces).await
     } else {
-        in_process(engine, question, values, pieces).await
+        in_process(engine, question, values, pieces).await.map(Some)
     }
 }
 
-/// The version along time; a cluster's executors read its fields instead.
-pub(super) async fn opened(
-    engine: &Engine,
-    manifest: &Manifest,
-    id: &ManifestId,
-) -> Result<Option<Values>, ComputeError> {
-    if engine.is_distributed() {
-        return Ok(None);
-    }
-    engine.values(manifest, id).await.map(Some)
+/// Fields are always there.
+pub(super) fn changed_meanwhile() -> ComputeError {
+    ComputeError::inconsistent(
+        "statistics",
+        "executors did not find the fields of the version",
+    )
 }
 
 async fn in_process(
@@ -51,8 +48,9 @@ async fn in_process(
     pieces: Vec<Piece>,
 ) -> Result<Accumulated, ComputeError> {
     let worker = Worker::new(engine.objects(), question, values).await?;
-    // One is read while the others are reduced.
-    let at_once = engine.partitions().get() + 1;
+    // One is read while the others are reduced; each is held as it was stored, and as it is reduced.
+    let held = engine.memory_bytes() / (4 * PIECE_BYTES as usize);
+    let at_once = (engine.partitions().get() + 1).min(held.max(1));
     let mut reduced = stream::iter(pieces)
         .map(|piece| worker.reduce(piece))
         .buffer_unordered(at_once);
@@ -67,7 +65,7 @@ async fn distributed(
     engine: &Engine,
     question: Question,
     pieces: Vec<Piece>,
-) -> Result<Accumulated, ComputeError> {
+) -> Result<Option<Accumulated>, ComputeError> {
     let keys: BTreeSet<ObjectKey> = pieces.iter().map(|piece| piece.key.clone()).collect();
     let keys: Vec<&ObjectKey> = keys.iter().collect();
     let all = Task { question, pieces };
@@ -104,12 +102,16 @@ async fn ask(context: QueryContext, sql: &str) -> Result<Vec<RecordBatch>, Compu
     query.collect().await.map_err(failed())
 }
 
-/// The one row of an answer.
-fn only_part(batches: &[RecordBatch]) -> Result<Accumulated, ComputeError> {
+/// The one row of an answer; none if it is NULL.
+fn only_part(batches: &[RecordBatch]) -> Result<Option<Accumulated>, ComputeError> {
     let mut rows = batches.iter().filter(|batch| batch.num_rows() > 0);
     match (rows.next(), rows.next()) {
-        (Some(batch), None) if batch.num_rows() == 1 && batch.column(0).is_valid(0) => {
-            Accumulated::of_bytes(batch.column(0).as_binary::<i32>().value(0))
+        (Some(batch), None) if batch.num_rows() == 1 => {
+            let part = batch.column(0).as_binary::<i32>();
+            let part = part
+                .is_valid(0)
+                .then(|| Accumulated::of_bytes(part.value(0)));
+            part.transpose()
         }
         _ => Err(ComputeError::inconsistent(
             "statistics",

@@ -1,6 +1,7 @@
 //! A piece of a question: some blocks of a run of steps, or chunks of a field, read, reduced and forgotten.
 
-use std::collections::BTreeSet;
+use std::cmp::Reverse;
+use std::collections::{BTreeSet, BinaryHeap};
 use std::sync::Arc;
 
 use contract::chunk::Window;
@@ -41,7 +42,7 @@ impl Task {
         serde_json::from_str(text).map_err(|e| ComputeError::inconsistent("a task", e))
     }
 
-    /// Its pieces as at most `count` tasks, none of them idle.
+    /// Its pieces as at most `count` tasks, none of them idle, each with about as much to read as the others.
     pub(crate) fn dealt(self, count: usize) -> Vec<Self> {
         let count = count.clamp(1, self.pieces.len().max(1));
         let task = |_part| Self {
@@ -49,20 +50,53 @@ impl Task {
             pieces: vec![],
         };
         let mut tasks: Vec<Self> = (0..count).map(task).collect();
-        for (at, piece) in self.pieces.into_iter().enumerate() {
-            tasks[at % count].pieces.push(piece);
+        // The largest first, each to who has least: a list that alternates would make every other task a long one.
+        let mut pieces = self.pieces;
+        pieces.sort_by_key(|piece| Reverse(piece.cost_bytes()));
+        let mut least: BinaryHeap<Reverse<(u64, usize)>> =
+            (0..count).map(|at| Reverse((0, at))).collect();
+        for piece in pieces {
+            let Some(Reverse((bytes, at))) = least.pop() else {
+                break;
+            };
+            least.push(Reverse((bytes + piece.cost_bytes().max(1), at)));
+            tasks[at].pieces.push(piece);
         }
         tasks
     }
 
-    /// Works on its pieces one after the other.
-    pub(crate) async fn run(self, objects: &Objects) -> Result<Accumulated, ComputeError> {
-        let worker = Worker::new(objects, self.question, None).await?;
+    /// Works on its pieces one after the other. None where this process does not find along time what they were to be read
+    /// from: a cube goes on while a question is on its way.
+    pub(crate) async fn run(self, objects: &Objects) -> Result<Option<Accumulated>, ComputeError> {
+        let is_along_time = |piece: &Piece| matches!(piece.layout, Layout::Blocks | Layout::Sums);
+        let values = if self.pieces.iter().any(is_along_time) {
+            objects.values(&self.question.version).await?
+        } else {
+            None
+        };
+        let holds = |piece: &Piece| match (piece.layout, &values) {
+            (Layout::Field(_), _) => true,
+            (Layout::Blocks | Layout::Sums, None) => false,
+            (Layout::Blocks, Some(values)) => {
+                let steps = piece.of_version();
+                let runs = values.time_major();
+                runs.iter()
+                    .any(|run| run.start <= steps.start && steps.end <= run.end)
+            }
+            (Layout::Sums, Some(values)) => {
+                let basis = values.summed_as(&piece.of_version());
+                basis.is_some_and(|basis| basis.scale == self.question.scale)
+            }
+        };
+        if !self.pieces.iter().all(holds) {
+            return Ok(None);
+        }
+        let worker = Worker::new(objects, self.question, values).await?;
         let mut all = Accumulated::default();
         for piece in self.pieces {
             all.merge(worker.reduce(piece).await?)?;
         }
-        Ok(all)
+        Ok(Some(all))
     }
 }
 
@@ -151,9 +185,7 @@ impl Worker {
         let across = shape[1].div_ceil(BLOCK_CELLS);
         let places = piece.rows.iter().map(|row| [row / across, row % across]);
         let places: Vec<[u32; 2]> = places.collect();
-        let [start, end] =
-            [piece.steps.start, piece.steps.end].map(|step| (piece.first_step + step) as usize);
-        let encoded = values.encoded(&places, start..end).await?;
+        let encoded = values.encoded(&places, piece.of_version()).await?;
         let Some(encoded) = encoded else {
             return Err(ComputeError::inconsistent(piece.key.as_str(), NOT_OPENED));
         };
@@ -171,15 +203,14 @@ impl Worker {
     /// Reads stored sums of blocks, and the values of those that could not be summed.
     async fn stored(&self, piece: Piece) -> Result<Accumulated, ComputeError> {
         let not_opened = || ComputeError::inconsistent(piece.key.as_str(), NOT_OPENED);
-        let [start, end] =
-            [piece.steps.start, piece.steps.end].map(|step| (piece.first_step + step) as usize);
+        let steps = piece.of_version();
         let values = self.values.clone().ok_or_else(not_opened)?;
-        let basis = values.summed_as(&(start..end)).ok_or_else(not_opened)?;
+        let basis = values.summed_as(&steps).ok_or_else(not_opened)?;
         let across = self.question.shape[1].div_ceil(BLOCK_CELLS);
         let terms = Arc::new(Terms::of(&piece.inside, across, basis.shard_cols));
         let places = terms.blocks().map(|block| [block / across, block % across]);
         let places: Vec<[u32; 2]> = places.collect();
-        let encoded = values.sums(&places, start..end).await?;
+        let encoded = values.sums(&places, steps).await?;
         let encoded = Arc::new(encoded.ok_or_else(not_opened)?);
         let (worker, piece) = (self.clone(), Arc::new(piece));
         let (own, of) = (Arc::clone(&encoded), Arc::clone(&piece));
@@ -311,9 +342,7 @@ impl Worker {
         match (piece.layout, &self.values) {
             (Layout::Field(period), _) => vec![measure.seconds(period)],
             (Layout::Blocks | Layout::Sums, Some(values)) => {
-                let first = piece.first_step as usize;
-                let all = first + piece.steps.start as usize..first + piece.steps.end as usize;
-                let steps = &values.manifest().steps[all];
+                let steps = &values.manifest().steps[piece.of_version()];
                 steps
                     .iter()
                     .map(|step| measure.seconds(step.period))

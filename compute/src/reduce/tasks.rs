@@ -4,26 +4,20 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use contract::chunk::{CHUNK_COLS, CHUNK_ROWS};
 use contract::digest::Digest;
 use contract::manifest::{Manifest, ManifestId};
 use cube::scale::Scale;
-use cube::{BLOCK_CELLS, Basis, Values};
+use cube::{Basis, Values};
 use storage::Store;
 
 use super::cells::Cells;
 use super::inside::{Inside, InsideRun};
-use super::question::{Layout, Piece};
+use super::question::{CHUNK_BYTES, Layout, OPEN_BYTES, Piece, RECORD_BYTES, block_bytes};
 
 /// Values that a piece holds at once, bytes before compression.
-const PIECE_BYTES: u64 = 8 << 20;
-/// What it costs to open one more file, in bytes read.
-const OPEN_BYTES: u64 = 64 << 10;
-/// Bytes of a record of sums, before compression.
-const RECORD_BYTES: u64 = 6 << 10;
+pub(super) const PIECE_BYTES: u64 = 8 << 20;
 /// Runs of blocks whose sums a piece holds at once: some of each piece of the region.
 const SUMS_AT_ONCE: usize = 512;
-const VALUE_BYTES: u64 = size_of::<f32>() as u64;
 
 /// What is read of a run of steps.
 #[derive(Debug)]
@@ -102,7 +96,7 @@ impl Version<'_> {
             rows: rows.to_vec(),
             inside: inside.to_vec(),
         };
-        let at_once = (PIECE_BYTES / block_bytes(run)).max(1) as usize;
+        let at_once = (PIECE_BYTES / block_bytes(run.len() as u64)).max(1) as usize;
         let blocks = inside.rim.chunks(at_once);
         let blocks = blocks.map(|rows| piece(Layout::Blocks, rows, &[]));
         let sums = inside.runs.chunks(SUMS_AT_ONCE);
@@ -168,11 +162,6 @@ impl<'a> Parts<'a> {
     }
 }
 
-/// Bytes of a block in a run of steps.
-fn block_bytes(run: &Range<u32>) -> u64 {
-    u64::from(BLOCK_CELLS * BLOCK_CELLS) * VALUE_BYTES * run.len().max(1) as u64
-}
-
 /// Would less be read of single fields than of a run of steps?
 pub(crate) fn are_fields_less(
     run: &Range<u32>,
@@ -181,8 +170,7 @@ pub(crate) fn are_fields_less(
     chunk_count: usize,
 ) -> bool {
     let records = record_count as u64 * RECORD_BYTES;
-    let blocks = block_count as u64 * block_bytes(run) + records + OPEN_BYTES;
-    let chunk_bytes = u64::from(CHUNK_ROWS * CHUNK_COLS) * VALUE_BYTES;
-    let fields = wanted as u64 * (chunk_count as u64 * chunk_bytes + OPEN_BYTES);
+    let blocks = block_count as u64 * block_bytes(run.len() as u64) + records + OPEN_BYTES;
+    let fields = wanted as u64 * (chunk_count as u64 * CHUNK_BYTES + OPEN_BYTES);
     fields < blocks
 }

@@ -1,5 +1,7 @@
 //! A cluster of real processes: the same bits as one process, whatever is killed on the way.
 
+use std::fs;
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 use compute::computed::{Request, compute};
@@ -13,12 +15,14 @@ use contract::quantity::Quantity;
 use contract::region::{Polygon, Region};
 use contract::statistics::{StatisticsAnswer, StatisticsQuery};
 use contract::time::{Period, TimeStep};
+use cube::RUN_STEPS;
 use storage::Store;
 
 use crate::computed::{land_inputs, windy};
 use crate::fixture::{ONE_DEGREE, ask, folder_store, land, parts, product, total, wavy_year};
 use crate::node::{Cluster, LIMIT};
 use crate::statistics::{POLYGON, area, asked};
+use crate::stored_sums::{GRID, compacted, noise};
 
 /// Parts that queries are cut into, whatever the number of executors.
 const PARTS: usize = 8;
@@ -130,6 +134,65 @@ async fn one_two_and_seven_executors_give_the_bits_of_one_process() {
     let manifest = derive_accumulated(&alone, &product("wavy"), None, &|_| ()).await;
     let manifest = manifest.unwrap();
     assert!(derived.iter().all(|other| *other == manifest));
+}
+
+/// Moves what a store's folder holds under some names to another folder, or back.
+fn put_aside(from: &Path, to: &Path, names: &[String]) {
+    for name in names {
+        let aside = to.join(name);
+        fs::create_dir_all(aside.parent().unwrap()).unwrap();
+        fs::rename(from.join(name), aside).unwrap();
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn executors_read_along_time_and_fields_where_a_cube_is_gone_since_it_was_planned_with() {
+    let (folder, store) = folder_store();
+    let steps = noise(&GRID, 150, 5);
+    let manifest = land(&store, &product("p"), Quantity::CarbonFlux, GRID, &steps).await;
+    assert!(compacted(&store, &manifest).await > 0);
+    let fields = manifest.steps[..RUN_STEPS].iter();
+    let fields: Vec<String> = fields.map(|step| step.field.as_str().to_owned()).collect();
+    let asked_of = |geometry: AskedGeometry, statistics: &str, step| StatisticsQuery {
+        product: product("p"),
+        ..asked(geometry, statistics, step)
+    };
+    let line = || AskedGeometry::line("170.5,-33.3;-120.1,12.7;-100,85").unwrap();
+    let first = [
+        asked_of(area("global"), "mean,std,coverage", TimeStep::Native),
+        asked_of(area(POLYGON), "min,max,mean,median", TimeStep::Month),
+        asked_of(line(), "mean,p90", TimeStep::Total),
+    ];
+    let second = asked_of(area("-40,-50,60,30"), "mean,std,count", TimeStep::Native);
+    let sum = BudgetQuery {
+        step: TimeStep::Month,
+        ..total(&product("p"), "-100,-33.3,-20.1,12.7")
+    };
+    let alone = Engine::local(store.clone());
+    let mut expected = vec![];
+    for question in &first {
+        expected.push(statistics(&alone, question).await.unwrap());
+    }
+    let expected_sum = ask(&alone, &sum).await;
+    let expected_second = statistics(&alone, &second).await.unwrap();
+
+    let mut cluster = Cluster::start(folder.path());
+    cluster.add(2, 0, 0);
+    let engine = engine(&store, &cluster);
+    let aside = tempfile::tempdir().unwrap();
+    put_aside(folder.path(), aside.path(), &fields);
+    for (question, expected) in first.iter().zip(&expected) {
+        assert_eq!(statistics(&engine, question).await.unwrap(), *expected);
+    }
+    assert_eq!(ask(&engine, &sum).await, expected_sum);
+    put_aside(aside.path(), folder.path(), &fields);
+
+    // Who asks has opened the cube and plans with it; executors that never saw it come too late.
+    cluster.executors.clear();
+    put_aside(folder.path(), aside.path(), &["cubes".to_owned()]);
+    cluster.add(2, 0, 0);
+    let found = statistics(&engine, &second).await.unwrap();
+    assert_eq!(found, expected_second);
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -19,7 +19,7 @@ use storage::Store;
 use crate::fixture::{folder_store, land, parts, product};
 
 /// Cells of 2 degrees: at the north and in the east blocks are cut.
-const GRID: Grid = Grid {
+pub(crate) const GRID: Grid = Grid {
     rows: 90,
     cols: 179,
     north_deg: 90.0,
@@ -91,7 +91,7 @@ fn days(count: usize) -> impl Iterator<Item = Period> {
 }
 
 /// Days of noise with land and with gaps that come and go.
-fn noise(grid: &Grid, count: usize, seed: u64) -> Vec<(Period, Vec<f32>)> {
+pub(crate) fn noise(grid: &Grid, count: usize, seed: u64) -> Vec<(Period, Vec<f32>)> {
     let mut random = Random(seed);
     let step = |period| {
         let value = |cell: usize| {
@@ -132,7 +132,7 @@ async fn rows(
     answer.map(|own| own.rows).map_err(|e| e.to_string())
 }
 
-async fn compacted(store: &Store, manifest: &Manifest) -> usize {
+pub(crate) async fn compacted(store: &Store, manifest: &Manifest) -> usize {
     cube::follow(store, manifest).await.unwrap();
     cube::compact(store, FOLDER).await.unwrap()
 }

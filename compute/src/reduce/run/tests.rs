@@ -3,16 +3,24 @@
 use std::num::NonZeroUsize;
 
 use contract::digest::Digest;
+use contract::manifest::ManifestId;
 use cube::scale::Scale;
 use cube::weight_unit::WeightUnit;
 use datafusion::arrow::util::pretty::pretty_format_batches;
 use storage::Store;
 
 use super::*;
+use crate::Objects;
+use crate::reduce::inside::InsideRun;
 use crate::reduce::question::{Layout, Wanted};
+
+fn version() -> ManifestId {
+    "p@1-0123abcd".parse().unwrap()
+}
 
 fn question() -> Question {
     Question {
+        version: version(),
         shape: [16, 16],
         whole: "computed:{'quoted'}".to_owned(),
         covered: "computed:{}".to_owned(),
@@ -79,6 +87,48 @@ fn every_piece_is_in_one_task_and_no_task_is_idle() {
         let text = tasks[0].text();
         assert_eq!(Task::of_text(&text).unwrap().text(), text);
     }
+}
+
+#[test]
+fn tasks_have_about_as_much_to_read_whatever_the_order_of_pieces() {
+    // A run of a region is a piece of values and one of sums, one after the other.
+    let kinds = |at: u32, piece: Piece| match at % 2 {
+        0 => Piece {
+            rows: (0..200 + at % 7).collect(),
+            ..piece
+        },
+        _ => Piece {
+            layout: Layout::Sums,
+            inside: vec![InsideRun::over(0..=9)],
+            ..piece
+        },
+    };
+    let pieces = (0..).zip(pieces(92)).map(|(at, piece)| kinds(at, piece));
+    let all = Task {
+        question: question(),
+        pieces: pieces.collect(),
+    };
+    let costs = |tasks: &[Task]| {
+        let cost = |task: &Task| task.pieces.iter().map(Piece::cost_bytes).sum::<u64>();
+        tasks.iter().map(cost).collect::<Vec<u64>>()
+    };
+    let whole: u64 = costs(std::slice::from_ref(&all))[0];
+    for count in [2, 8, 16] {
+        let costs = costs(&all.clone().dealt(count));
+        assert_eq!(costs.iter().sum::<u64>(), whole);
+        let most = costs.iter().max().unwrap();
+        assert!(most * count as u64 <= whole * 5 / 4, "{count}: {costs:?}");
+    }
+}
+
+#[tokio::test]
+async fn a_task_whose_values_are_not_along_time_here_says_so_instead_of_reading_others() {
+    let store = Store::memory();
+    let run = async |objects: &Objects| all(2).run(objects).await;
+    let (root, objects) = store.sql_root();
+    assert_eq!(run(&Objects::new(root, objects)).await.unwrap(), None);
+    // A version that is not there is no such case.
+    assert!(run(&Objects::of(&store)).await.is_err());
 }
 
 #[tokio::test(flavor = "multi_thread")]
