@@ -22,7 +22,7 @@ use crate::{ComputeError, Engine, catalogue};
 pub(crate) use at_cell::counts_at_cell;
 use derivation::Derivation;
 use source::{SourceStep, steps_since};
-pub use statistic::derive_statistic;
+pub use statistic::{derive_statistic, derive_statistics};
 
 /// How often the commit is tried again when another writer takes the number.
 const COMMIT_ATTEMPTS: u32 = 5;

@@ -1,15 +1,20 @@
 //! Statistics of every cell as products.
 
-use compute::derive::derive_statistic;
+use compute::analysis::trend::trend as trend_of_series;
+use compute::derive::{derive_statistic, derive_statistics};
+use compute::reduce::statistics as statistics_of_newest;
 use compute::{ComputeError, Engine, ErrorClass};
 use contract::analysis::{CalendarBins, MapOptions, MapStatistic};
-use contract::grid::Grid;
+use contract::geometry::{AskedGeometry, Sampling};
+use contract::grid::{Grid, LonLatDeg};
 use contract::manifest::Manifest;
 use contract::quantity::Quantity;
-use contract::time::Period;
+use contract::statistics::{StatisticsQuery, StatisticsRow};
+use contract::time::{Period, TimeStep};
 use storage::{Store, domain, fields};
 
 use crate::fixture::{folder_store, land, parts, product};
+use crate::statistics::asked;
 
 /// Blocks that are cut at both edges.
 const GRID: Grid = Grid {
@@ -112,6 +117,27 @@ async fn a_climatology_is_a_product_of_twelve_months() {
         }
         assert_eq!(derived(&engine, &options).await.unwrap(), made);
     }
+    // Nor does memory change a bit: blocks are read two by two.
+    let small = engine.clone().with_memory_bytes(160 << 10);
+    let name = Some(product("small"));
+    let of_small = MapOptions {
+        name,
+        ..options.clone()
+    };
+    let of_small = derived(&small, &of_small).await.unwrap();
+    let (a, b) = (
+        read(&store, &made, 6).await,
+        read(&store, &of_small, 6).await,
+    );
+    assert!(a.iter().zip(&b).all(|(a, b)| a.to_bits() == b.to_bits()));
+    let tiny = engine.clone().with_memory_bytes(64 << 10);
+    let name = Some(product("tiny"));
+    let refused = MapOptions {
+        name,
+        ..options.clone()
+    };
+    let refused = derived(&tiny, &refused).await.unwrap_err();
+    assert!(refused.to_string().contains("--memory-mib"), "{refused}");
     // One July more, and it is made anew.
     let mut more = steps();
     more[30].1[at(4, 0)] += 3.0;
@@ -243,6 +269,25 @@ async fn trends_and_their_chances_are_maps_of_their_own_quantities() {
     let values = read(&store, &chance, 0).await;
     assert!(values.iter().all(|p| p.is_nan() || (0.0..=1.0).contains(p)));
     assert!(values[at(3, 36)] < 0.05, "{}", values[at(3, 36)]);
+    let of_line = MapOptions::new(MapStatistic::LeastSquaresTrend);
+    let line = read(&store, &derived(&engine, &of_line).await.unwrap(), 0).await[at(3, 36)];
+    let of_line = MapOptions::new(MapStatistic::LeastSquaresTrendPValue);
+    let of_line = read(&store, &derived(&engine, &of_line).await.unwrap(), 0).await[at(3, 36)];
+    let cell: Vec<f64> = steps
+        .iter()
+        .map(|(_, values)| f64::from(values[at(3, 36)]))
+        .collect();
+    let periods: Vec<Period> = steps.iter().map(|(period, _)| *period).collect();
+    let right = trend_of_series(&periods, &cell, TimeStep::Month, "").unwrap();
+    let right = right.least_squares;
+    assert!(
+        (f64::from(line) - right.slope_per_decade / 10.0).abs() < 1e-6,
+        "{line}"
+    );
+    assert!(
+        (f64::from(of_line) - right.p_value.unwrap()).abs() < 1e-6,
+        "{of_line}"
+    );
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -321,6 +366,169 @@ async fn what_is_no_statistic_is_refused_with_the_reason() {
             .await;
         }
         let refused = of(name, options).await;
+        assert!(refused.to_string().contains(reason), "{refused}");
+        assert_eq!(refused.class(), ErrorClass::BadRequest);
+    }
+}
+
+/// Statistics of a place by the other way, through sums of one cell.
+async fn of_place(engine: &Engine, [lon, lat]: [f64; 2], statistics: &str) -> StatisticsRow {
+    let place = LonLatDeg::new(lon, lat).unwrap();
+    let query = StatisticsQuery {
+        product: product("wind"),
+        ..asked(
+            AskedGeometry::point(place, Sampling::Cell),
+            statistics,
+            TimeStep::Total,
+        )
+    };
+    let answer = statistics_of_newest(engine, &query).await.unwrap();
+    answer.rows.into_iter().next().unwrap()
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn extremes_percentiles_and_counts_of_cells_are_those_of_places() {
+    let (_folder, store) = folder_store();
+    landed(&store).await;
+    let engine = Engine::in_process(store.clone(), parts(2));
+    let names = ["min", "max", "median", "p12.5", "p90", "count", "coverage"];
+    let mut options: Vec<MapOptions> = names
+        .iter()
+        .map(|name| MapOptions {
+            least_percent: 2,
+            ..MapOptions::new(name.parse().unwrap())
+        })
+        .collect();
+    options.extend([MapStatistic::MinTime, MapStatistic::MaxTime].map(MapOptions::new));
+    let made = derive_statistics(&engine, &product("wind"), &options, &|_| ()).await;
+    let made = made.unwrap();
+    assert_eq!(made[3].product.as_str(), "wind-p12-5");
+    assert_eq!(
+        (made[1].quantity, made[5].quantity.unit()),
+        (Quantity::WindSpeed, "1")
+    );
+    let mut maps = vec![];
+    for one in &made {
+        maps.push(read(&store, one, 0).await);
+    }
+    // One with all steps, two with gaps; the last has one step of 36.
+    for (row, col) in [(4, 0), (11, 5), (7, 6)] {
+        let place = [f64::from(col) - 29.5, 39.5 - f64::from(row)];
+        let right = of_place(&engine, place, &names.join(",")).await;
+        let cell = at(row as usize, col as usize);
+        for (name, map) in names.iter().zip(&maps) {
+            let (own, right) = (f64::from(map[cell]), right.values[*name].unwrap());
+            assert!(
+                (own - right).abs() < 1e-5,
+                "{name} of {row} {col}: {own} {right}"
+            );
+        }
+        if col == 6 {
+            assert!(
+                maps[7][cell].is_nan() && maps[8][cell].is_nan(),
+                "less than half"
+            );
+            continue;
+        }
+        for (name, map) in [("min", &maps[7]), ("max", &maps[8])] {
+            let days = right.found_at[name].ms() as f64 / 86_400_000.0;
+            assert!((f64::from(map[cell]) - days).abs() < 2e-3, "{name}: {days}");
+        }
+    }
+    // Land has no values, of counts too.
+    assert!(maps.iter().all(|map| map[at(4, 3)].is_nan()));
+}
+
+/// Cuts cells at every edge: 20 to 23 W, 29 to 32 N.
+const OBLONG: &str = "POLYGON((-22.7 29.5,-20.2 29.5,-20.2 31.4,-22.7 31.4,-22.7 29.5))";
+
+fn of(statistic: MapStatistic, region: Option<&str>, name: &str) -> MapOptions {
+    MapOptions {
+        region: region.map(|text| text.parse().unwrap()),
+        name: Some(product(name)),
+        ..MapOptions::new(statistic)
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_region_has_the_values_of_the_whole_in_its_cells_and_none_elsewhere() {
+    let (_folder, store) = folder_store();
+    landed(&store).await;
+    let engine = Engine::in_process(store.clone(), parts(2));
+    let region = Some(OBLONG);
+    let all = [
+        of(MapStatistic::Climatology, None, "a"),
+        of(MapStatistic::Anomaly, None, "b"),
+        of(MapStatistic::Spread, None, "c"),
+    ];
+    let mut whole = vec![];
+    for one in &all {
+        // One by one here, together there: what they share changes nothing.
+        whole.push(derived(&engine, one).await.unwrap());
+    }
+    let some = [
+        of(MapStatistic::Climatology, region, "d"),
+        of(MapStatistic::Anomaly, region, "e"),
+        of(MapStatistic::Spread, region, "f"),
+    ];
+    let made = derive_statistics(&engine, &product("wind"), &some, &|_| ()).await;
+    let made = made.unwrap();
+    assert!(
+        made[1].title.contains("by month in POLYGON"),
+        "{}",
+        made[1].title
+    );
+    for (whole, own) in whole.iter().zip(&made) {
+        assert_eq!(whole.steps.len(), own.steps.len());
+        for step in 0..own.steps.len() {
+            let (all, some) = (
+                read(&store, whole, step).await,
+                read(&store, own, step).await,
+            );
+            for row in 0..19 {
+                for col in 0..37 {
+                    let is_inside = (8..=10).contains(&row) && (7..=9).contains(&col);
+                    let (all, own) = (all[at(row, col)], some[at(row, col)]);
+                    assert!(if is_inside {
+                        own.to_bits() == all.to_bits()
+                    } else {
+                        own.is_nan()
+                    });
+                }
+            }
+        }
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn statistics_that_are_there_are_not_made_again_and_regions_that_do_not_fit_are_refused() {
+    let (_folder, store) = folder_store();
+    landed(&store).await;
+    let engine = Engine::in_process(store.clone(), parts(2));
+    let some = [
+        of(MapStatistic::Mean, Some(OBLONG), "d"),
+        of(MapStatistic::Spread, Some(OBLONG), "f"),
+    ];
+    let made = derive_statistics(&engine, &product("wind"), &some, &|_| ()).await;
+    let made = made.unwrap();
+    let again = derive_statistics(&engine, &product("wind"), &some, &|_| ()).await;
+    assert_eq!(again.unwrap(), made);
+    let other = of(MapStatistic::Spread, Some("-25,20,-10,35"), "f");
+    assert_eq!(derived(&engine, &other).await.unwrap().number, 2);
+    let whole = of(MapStatistic::Spread, None, "c");
+    let nameless = MapOptions {
+        name: None,
+        ..some[1].clone()
+    };
+    let elsewhere = of(MapStatistic::Mean, Some("50,50,60,60"), "g");
+    for (wrong, reason) in [
+        (vec![whole.clone(), some[1].clone()], "one region"),
+        (vec![whole.clone(), whole], "one product"),
+        (vec![elsewhere], "outside the grid"),
+        (vec![nameless], "--name"),
+    ] {
+        let refused = derive_statistics(&engine, &product("wind"), &wrong, &|_| ()).await;
+        let refused = refused.unwrap_err();
         assert!(refused.to_string().contains(reason), "{refused}");
         assert_eq!(refused.class(), ErrorClass::BadRequest);
     }

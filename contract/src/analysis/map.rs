@@ -3,19 +3,34 @@
 use std::fmt::{Display, Formatter};
 use std::str::FromStr;
 
-use serde::{Deserialize, Serialize};
+use serde::{Serialize, Serializer};
 
 use super::{BasePeriod, CalendarBins};
 use crate::ContractError;
 use crate::product::ProductId;
+use crate::region::{AskedRegion, NamedRegion};
+use crate::statistics::Percentile;
 use crate::time::TimeMs;
 
 /// A statistic over time of each cell by itself.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum MapStatistic {
     /// Mean over time, each step by its length.
     Mean,
+    /// The lowest step.
+    Min,
+    /// The highest step.
+    Max,
+    /// When the lowest step is: its middle, days from the start of 1970; of equal ones the first.
+    MinTime,
+    /// The same of the highest one.
+    MaxTime,
+    /// The value that so much of the time with data lies at or below.
+    Percentile(Percentile),
+    /// Steps with data.
+    Count,
+    /// Share of the time with data.
+    Coverage,
     /// Standard deviation of the steps about their mean, divided by one less than their number.
     Spread,
     /// Mean of each month or season over the base period.
@@ -30,12 +45,23 @@ pub enum MapStatistic {
     Trend,
     /// Chance of a score of Mann and Kendall as far from none where there is no trend, its variance corrected after Hamed and Rao.
     TrendPValue,
+    /// Slope of the line of least squares through the same means.
+    LeastSquaresTrend,
+    /// Chance of such a slope where there is none, by an effective number of means that allows for autocorrelation.
+    LeastSquaresTrendPValue,
 }
 
 impl MapStatistic {
-    /// All of them, in the order they are offered.
-    pub const ALL: [Self; 8] = [
+    /// All of them, in the order they are offered; of percentiles the median.
+    pub const ALL: [Self; 17] = [
         Self::Mean,
+        Self::Min,
+        Self::Max,
+        Self::MinTime,
+        Self::MaxTime,
+        Self::Percentile(Percentile::MEDIAN),
+        Self::Count,
+        Self::Coverage,
         Self::Spread,
         Self::Climatology,
         Self::Anomaly,
@@ -43,12 +69,26 @@ impl MapStatistic {
         Self::Phase,
         Self::Trend,
         Self::TrendPValue,
+        Self::LeastSquaresTrend,
+        Self::LeastSquaresTrendPValue,
     ];
 
-    /// Name on the command line, and what the name of its product ends with.
-    pub fn as_str(self) -> &'static str {
+    /// Its name as part of one of a product: `p97-5`.
+    pub fn word(self) -> String {
+        self.to_string().replace('.', "-")
+    }
+
+    /// Its name, but for percentiles that are not the median.
+    fn of_all(self) -> &'static str {
         match self {
             Self::Mean => "mean",
+            Self::Min => "min",
+            Self::Max => "max",
+            Self::MinTime => "min-time",
+            Self::MaxTime => "max-time",
+            Self::Percentile(_) => "median",
+            Self::Count => "count",
+            Self::Coverage => "coverage",
             Self::Spread => "spread",
             Self::Climatology => "climatology",
             Self::Anomaly => "anomaly",
@@ -56,6 +96,8 @@ impl MapStatistic {
             Self::Phase => "phase",
             Self::Trend => "trend",
             Self::TrendPValue => "trend-p-value",
+            Self::LeastSquaresTrend => "least-squares-trend",
+            Self::LeastSquaresTrendPValue => "least-squares-trend-p-value",
         }
     }
 
@@ -65,9 +107,21 @@ impl MapStatistic {
     }
 }
 
+/// Name on the command line, such as `trend-p-value` or `p97.5`.
 impl Display for MapStatistic {
     fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
-        f.write_str(self.as_str())
+        match self {
+            Self::Percentile(percentile) if *percentile != Percentile::MEDIAN => {
+                write!(f, "p{percentile}")
+            }
+            other => f.write_str(other.of_all()),
+        }
+    }
+}
+
+impl Serialize for MapStatistic {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
     }
 }
 
@@ -77,19 +131,25 @@ impl FromStr for MapStatistic {
     fn from_str(s: &str) -> Result<Self, Self::Err> {
         let named = Self::ALL
             .into_iter()
-            .find(|statistic| statistic.as_str() == s);
-        named.ok_or_else(|| {
-            let names: Vec<_> = Self::ALL
-                .iter()
-                .map(|statistic| statistic.as_str())
-                .collect();
-            ContractError::invalid("statistic", s, names.join(", "))
-        })
+            .find(|statistic| statistic.of_all() == s);
+        if let Some(named) = named {
+            return Ok(named);
+        }
+        let is_percentile = |text: &&str| text.starts_with(|c: char| c.is_ascii_digit());
+        if let Some(percentile) = s.strip_prefix('p').filter(is_percentile) {
+            return Ok(Self::Percentile(percentile.parse()?));
+        }
+        let names: Vec<_> = Self::ALL
+            .iter()
+            .map(|statistic| statistic.of_all())
+            .collect();
+        let names = format!("{} and percentiles such as p97.5", names.join(", "));
+        Err(ContractError::invalid("statistic", s, names))
     }
 }
 
 /// What is derived.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct MapOptions {
     /// Of each cell.
     pub statistic: MapStatistic,
@@ -103,7 +163,10 @@ pub struct MapOptions {
     pub to: Option<TimeMs>,
     /// Share of the time, of a bin's steps or of the months that must hold data for a cell to have a value, percent.
     pub least_percent: u8,
-    /// Product that it becomes; `PRODUCT-STATISTIC` if absent.
+    /// Where: cells that lie in it, wholly or in part; everywhere if absent.
+    #[serde(skip)]
+    pub region: Option<AskedRegion>,
+    /// Product that it becomes; `PRODUCT-STATISTIC` if absent, and `-REGION` after it of a named one.
     #[serde(skip)]
     pub name: Option<ProductId>,
 }
@@ -118,6 +181,7 @@ impl MapOptions {
             from: None,
             to: None,
             least_percent: 50,
+            region: None,
             name: None,
         }
     }
@@ -125,11 +189,20 @@ impl MapOptions {
     /// The product that the statistic of a product becomes.
     ///
     /// # Errors
-    /// The name would be too long, is the product's own, or is kept for accumulated carbon.
+    /// The name would be too long, is the product's own, or is kept for accumulated carbon; a region without a name of its own,
+    /// and none for the product.
     pub fn target(&self, product: &ProductId) -> Result<ProductId, ContractError> {
-        let name = match &self.name {
-            Some(name) => name.clone(),
-            None => format!("{product}-{}", self.statistic).parse()?,
+        let statistic = self.statistic.word();
+        let name = match (&self.name, &self.region) {
+            (Some(name), _) => name.clone(),
+            (None, None) => format!("{product}-{statistic}").parse()?,
+            (None, Some(asked)) if NamedRegion::find(&asked.name).is_some() => {
+                format!("{product}-{statistic}-{}", asked.name).parse()?
+            }
+            (None, Some(asked)) => {
+                let reason = "a statistic of a region that has no name of its own needs a name for its product: --name";
+                return Err(ContractError::invalid("region", &asked.name, reason));
+            }
         };
         if name == *product || name.as_str().ends_with("-accumulated") {
             let reason = "a statistic needs a name of its own, which does not end in -accumulated";
@@ -146,15 +219,26 @@ mod tests {
     #[test]
     fn statistics_have_names_and_so_have_their_products() {
         for statistic in MapStatistic::ALL {
-            assert_eq!(statistic.as_str().parse(), Ok(statistic));
+            assert_eq!(statistic.to_string().parse(), Ok(statistic));
         }
-        assert!("median".parse::<MapStatistic>().is_err());
+        let percentile: MapStatistic = "p97.5".parse().unwrap();
+        assert_eq!(percentile.to_string(), "p97.5");
+        assert_eq!("p50".parse(), "median".parse::<MapStatistic>());
+        for none in ["p", "phases", "p101", "p9.1234", "mode"] {
+            assert!(none.parse::<MapStatistic>().is_err(), "{none}");
+        }
         let product: ProductId = "sst".parse().unwrap();
         let mut options = MapOptions::new(MapStatistic::TrendPValue);
         assert_eq!(
             options.target(&product).unwrap().as_str(),
             "sst-trend-p-value"
         );
+        options.region = Some("-10,20,30,40".parse().unwrap());
+        assert!(options.target(&product).is_err());
+        options.region = Some("equatorial-pacific".parse().unwrap());
+        options.statistic = percentile;
+        let name = options.target(&product).unwrap();
+        assert_eq!(name.as_str(), "sst-p97-5-equatorial-pacific");
         for taken in ["sst", "flux-accumulated"] {
             options.name = Some(taken.parse().unwrap());
             assert!(options.target(&product).is_err(), "{taken}");

@@ -1,8 +1,10 @@
 //! Options of statistics that become products.
 
+use anyhow::Result;
 use clap::Args;
 use contract::analysis::{BasePeriod, CalendarBins, MapOptions, MapStatistic};
 use contract::product::ProductId;
+use contract::region::AskedRegion;
 use contract::time::TimeMs;
 
 /// `fluxglobe derive statistic`.
@@ -11,10 +13,16 @@ pub(crate) struct DeriveStatistic {
     /// Product, of any quantity.
     #[arg(long)]
     pub(crate) product: ProductId,
-    /// mean, spread (standard deviation), climatology (a step a month or season), anomaly (every step less the
-    /// climatology), amplitude and phase of the year's wave, trend (Theil-Sen), trend-p-value (Mann-Kendall, Hamed-Rao).
-    #[arg(long, value_name = "NAME")]
-    pub(crate) statistic: MapStatistic,
+    /// One or more, separated by commas; the product is read once for all: mean, min, max, median, p97.5 and the like,
+    /// min-time and max-time (when), count and coverage (steps and share of the time with data), spread (standard deviation),
+    /// climatology (a step a month or season), anomaly (every step less the climatology), amplitude and phase of the year's wave,
+    /// trend (Theil-Sen), trend-p-value (Mann-Kendall, Hamed-Rao), least-squares-trend, least-squares-trend-p-value.
+    #[arg(long, value_name = "NAME,...", value_delimiter = ',', required = true)]
+    pub(crate) statistic: Vec<MapStatistic>,
+    /// Only the cells that lie in it, wholly or in part: `global`, a named region, a box WEST,SOUTH,EAST,NORTH, a GeoJSON or WKT
+    /// file, the text of one, or PRODUCT:CODE of a landed mask. Every cell if absent.
+    #[arg(long, allow_hyphen_values = true)]
+    pub(crate) region: Option<String>,
     /// Years of the climatology, both part of it: 1991/2020. All that the product covers if absent.
     #[arg(long, value_name = "FIRST/LAST")]
     pub(crate) base: Option<BasePeriod>,
@@ -30,7 +38,8 @@ pub(crate) struct DeriveStatistic {
     /// Share of the time, or of a bin's steps, that must hold data for a cell to have a value, percent.
     #[arg(long, default_value_t = 50, value_name = "PERCENT", value_parser = clap::value_parser!(u8).range(0..=100))]
     pub(crate) least_percent: u8,
-    /// Product that it becomes. PRODUCT-STATISTIC if absent.
+    /// Product that it becomes; of several statistics what their names begin with: NAME-STATISTIC. PRODUCT-STATISTIC if absent,
+    /// and -REGION after it where that is a named one.
     #[arg(long, value_name = "PRODUCT")]
     pub(crate) name: Option<ProductId>,
     #[command(flatten, next_help_heading = "Kafka")]
@@ -38,16 +47,29 @@ pub(crate) struct DeriveStatistic {
 }
 
 impl DeriveStatistic {
-    /// What is derived.
-    pub(crate) fn asked(&self) -> MapOptions {
-        MapOptions {
-            base: self.base,
-            bins: self.bins,
-            from: self.from,
-            to: self.to,
-            least_percent: self.least_percent,
-            name: self.name.clone(),
-            ..MapOptions::new(self.statistic)
-        }
+    /// What is derived, in a region or everywhere.
+    ///
+    /// # Errors
+    /// A name that would be too long.
+    pub(crate) fn asked(&self, region: Option<&AskedRegion>) -> Result<Vec<MapOptions>> {
+        let one = |statistic: &MapStatistic| -> Result<MapOptions> {
+            let name = match &self.name {
+                Some(name) if self.statistic.len() > 1 => {
+                    Some(format!("{name}-{}", statistic.word()).parse()?)
+                }
+                name => name.clone(),
+            };
+            Ok(MapOptions {
+                base: self.base,
+                bins: self.bins,
+                from: self.from,
+                to: self.to,
+                least_percent: self.least_percent,
+                region: region.cloned(),
+                name,
+                ..MapOptions::new(*statistic)
+            })
+        };
+        self.statistic.iter().map(one).collect()
     }
 }

@@ -16,6 +16,7 @@ use kafka_log::KafkaSettings;
 use storage::Store;
 use storage::log::EventLog;
 
+use super::budget::stored_region;
 use crate::cli::{
     Derive, DeriveCo2Flux, DeriveStatistic, DeriveWhat, Expression, Regrid, Settings,
 };
@@ -182,25 +183,34 @@ fn functions() -> Result<()> {
     progress::result(&text)
 }
 
-/// Computes a statistic of each cell with a progress bar; at once if it is there already.
+/// Computes statistics of each cell with a progress bar; at once those that are there already.
 async fn statistic(settings: &Settings, options: &DeriveStatistic) -> Result<()> {
     let store = deployment::store(settings)?;
     deployment::manifest(&store, &options.product, &settings.data).await?;
     let log = listening(settings, &options.kafka).await?;
-    let bar = progress::bar("statistic of each cell", 0);
+    let region = match &options.region {
+        Some(text) => Some(stored_region(settings, &store, text).await?),
+        None => None,
+    };
+    let asked = options.asked(region.as_ref())?;
+    let bar = progress::bar("statistics of each cell", 0);
     // A block of cells is read by one query, which a scheduler would only delay.
     let engine = deployment::region_engine(settings, store)?;
     let on_cells = |progress: DeriveProgress| {
         bar.set_length(progress.all_steps as u64);
         bar.set_position(progress.done_steps as u64);
     };
-    let asked = options.asked();
-    let derived = compute::derive::derive_statistic(&engine, &options.product, &asked, &on_cells);
-    let manifest = derived.await?;
-    tell(log.as_deref(), &manifest).await?;
-    let outcome = format!("{} fields of {}", manifest.steps.len(), manifest.product);
-    progress::done(&bar, &outcome);
-    progress::result(&manifest.id().to_string())
+    let derived = compute::derive::derive_statistics(&engine, &options.product, &asked, &on_cells);
+    let made = derived.await?;
+    let outcome =
+        |manifest: &Manifest| format!("{} fields of {}", manifest.steps.len(), manifest.product);
+    let outcomes: Vec<String> = made.iter().map(outcome).collect();
+    progress::done(&bar, &outcomes.join(", "));
+    for manifest in &made {
+        tell(log.as_deref(), manifest).await?;
+        progress::result(&manifest.id().to_string())?;
+    }
+    Ok(())
 }
 
 /// Tells of a derived version, once.

@@ -1,4 +1,4 @@
-//! Blocks of cells over all time, as many at once as fit a bound.
+//! Blocks of cells over all time, as many at once as fit a bound; of a region those that it touches.
 
 use std::ops::Range;
 
@@ -6,10 +6,12 @@ use contract::chunk::{Window, windows};
 use contract::manifest::Manifest;
 use cube::{BLOCK_CELLS, Values};
 
+use super::wanted::Wanted;
 use crate::ComputeError;
 
-/// Values that are held at once: 128 MiB of f32.
-const HELD_VALUES: usize = 32 << 20;
+/// Share of the memory for work that the values of some blocks take.
+const HELD_SHARE: usize = 8;
+
 /// Cells over all steps.
 pub(super) struct Cells {
     /// Place of each in the grid, row-major.
@@ -20,16 +22,21 @@ pub(super) struct Cells {
 
 /// The blocks of a product's grid, and how many are read at once.
 pub(super) struct Blocks {
-    windows: Vec<Window>,
+    /// By their numbers, increasing.
+    windows: Vec<(u32, Window)>,
     at_once: usize,
 }
 
 impl Blocks {
-    pub(super) fn of(manifest: &Manifest) -> Self {
+    /// Those in which some cell is wanted; work may take so much memory.
+    pub(super) fn of(manifest: &Manifest, wanted: &Wanted, memory_bytes: usize) -> Self {
         let a_block = (BLOCK_CELLS * BLOCK_CELLS) as usize * manifest.steps.len().max(1);
         Self {
-            windows: windows(&manifest.grid, BLOCK_CELLS, BLOCK_CELLS),
-            at_once: (HELD_VALUES / a_block).max(1),
+            windows: (0..)
+                .zip(windows(&manifest.grid, BLOCK_CELLS, BLOCK_CELLS))
+                .filter(|(_, window)| wanted.is_any_of(&manifest.grid, *window))
+                .collect(),
+            at_once: (memory_bytes / HELD_SHARE / (a_block * size_of::<f32>())).max(1),
         }
     }
 
@@ -46,14 +53,15 @@ impl Blocks {
         manifest: &Manifest,
         run: Range<usize>,
     ) -> Result<Cells, ComputeError> {
-        let blocks = &self.windows[run.clone()];
+        let blocks = &self.windows[run];
         let places = blocks
             .iter()
-            .flat_map(|block| block.cell_indices(&manifest.grid));
+            .flat_map(|(_, block)| block.cell_indices(&manifest.grid));
         let places: Vec<usize> = places.collect();
         let across = manifest.grid.cols.div_ceil(BLOCK_CELLS);
-        let asked: Vec<[u32; 2]> = run
-            .map(|block| [block as u32 / across, block as u32 % across])
+        let asked: Vec<[u32; 2]> = blocks
+            .iter()
+            .map(|(number, _)| [number / across, number % across])
             .collect();
         let step_count = manifest.steps.len();
         let mut cells = Cells {

@@ -1,18 +1,74 @@
 //! Statistics of one cell: its values at all steps in, one value for each step that is written out.
+//!
+//! Several statistics of a cell share what they have in common: a trend, its test and its season are worked out once.
 
-use contract::analysis::{CalendarBins, MapStatistic};
+use std::ops::Range;
+
+use contract::analysis::{CalendarBins, MapStatistic, Season, Trend};
+use contract::statistics::Percentile;
 use contract::time::{Period, TimeStep};
 
 use super::plan::Plan;
 use crate::analysis::climatology::spread;
 use crate::analysis::harmonics::season;
 use crate::analysis::trend::trend;
+use crate::reduce::least_part;
 
-/// What every cell needs, made once.
-pub(super) struct OfCell {
+const DAY_MS: f64 = 86_400_000.0;
+
+/// Statistics of a cell, each over its own steps, what they need made once.
+pub(super) struct OfCells(Vec<OfCell>);
+
+impl OfCells {
+    /// Those of some plans over the steps of these periods.
+    pub(super) fn new(plans: &[Plan], periods: &[Period]) -> Self {
+        let of_plan = |plan| OfCell::new(plan, periods);
+        Self(plans.iter().map(of_plan).collect())
+    }
+
+    /// Values that a cell has of each statistic: bins of those that have them, else one.
+    pub(super) fn output_counts(&self) -> Vec<usize> {
+        self.0.iter().map(OfCell::output_count).collect()
+    }
+
+    /// The statistics of a cell, one after the other, NaN where too little holds data; `values` are one for each step of the
+    /// version, stored unit, NaN no data.
+    pub(super) fn write(&self, values: &[f32], mut out: &mut [f64]) {
+        let mut shared = Shared::default();
+        for own in &self.0 {
+            let (first, rest) = out.split_at_mut(own.output_count());
+            own.write(&values[own.read.clone()], first, &mut shared);
+            out = rest;
+        }
+    }
+}
+
+/// What several statistics of one cell are read from, by the steps that it is of.
+#[derive(Default)]
+struct Shared {
+    trend: Option<(Range<usize>, Option<Trend>)>,
+    season: Option<(Range<usize>, Option<Season>)>,
+}
+
+/// What was found of some steps, found now if it was not.
+fn once<'a, T>(
+    kept: &'a mut Option<(Range<usize>, Option<T>)>,
+    steps: &Range<usize>,
+    find: impl FnOnce() -> Option<T>,
+) -> Option<&'a T> {
+    if kept.as_ref().is_none_or(|(of, _)| of != steps) {
+        *kept = Some((steps.clone(), find()));
+    }
+    kept.as_ref().and_then(|(_, found)| found.as_ref())
+}
+
+/// One statistic of a cell.
+struct OfCell {
     statistic: MapStatistic,
     bins: CalendarBins,
     least_share: f64,
+    /// Steps of the version that are read.
+    read: Range<usize>,
     /// Of the steps that are read.
     periods: Vec<Period>,
     /// Bin of each of them.
@@ -22,7 +78,8 @@ pub(super) struct OfCell {
 }
 
 impl OfCell {
-    pub(super) fn new(plan: &Plan, periods: Vec<Period>) -> Self {
+    fn new(plan: &Plan, periods: &[Period]) -> Self {
+        let periods = periods[plan.read.clone()].to_vec();
         let bin_of: Vec<usize> = periods.iter().map(|period| plan.bins.of(*period)).collect();
         let mut steps_of = vec![0; plan.bins.count()];
         for bin in &bin_of {
@@ -32,6 +89,7 @@ impl OfCell {
             statistic: plan.statistic,
             bins: plan.bins,
             least_share: plan.least_share,
+            read: plan.read.clone(),
             periods,
             bin_of,
             steps_of,
@@ -39,7 +97,7 @@ impl OfCell {
     }
 
     /// Values that a cell has: bins of those that have them, else one.
-    pub(super) fn output_count(&self) -> usize {
+    fn output_count(&self) -> usize {
         if self.statistic.has_bins() {
             self.bins.count()
         } else {
@@ -47,15 +105,23 @@ impl OfCell {
         }
     }
 
-    /// The statistic of a cell, `out` one for each output, NaN where too little holds data; `values` are one for each period,
-    /// stored unit, NaN no data.
-    pub(super) fn write(&self, values: &[f32], out: &mut [f64]) {
+    /// The statistic of a cell, `out` one for each output.
+    fn write(&self, values: &[f32], out: &mut [f64], shared: &mut Shared) {
         out.fill(f64::NAN);
         if self.statistic.has_bins() {
             self.bin_means(values, out);
-        } else if self.time_share(values) >= self.least_share {
-            out[0] = self.single(values).unwrap_or(f64::NAN);
+            return;
         }
+        let share = self.time_share(values);
+        out[0] = match self.statistic {
+            // These say how little there is.
+            MapStatistic::Coverage if share > 0.0 => 100.0 * share,
+            MapStatistic::Count if share > 0.0 => {
+                values.iter().filter(|value| !value.is_nan()).count() as f64
+            }
+            _ if share >= self.least_share => self.single(values, shared).unwrap_or(f64::NAN),
+            _ => f64::NAN,
+        };
     }
 
     /// Share of the time of all steps that holds data.
@@ -87,7 +153,7 @@ impl OfCell {
         }
     }
 
-    fn single(&self, values: &[f32]) -> Option<f64> {
+    fn single(&self, values: &[f32], shared: &mut Shared) -> Option<f64> {
         match self.statistic {
             MapStatistic::Mean => {
                 let (mut sum, mut seconds) = (0.0, 0.0);
@@ -103,21 +169,64 @@ impl OfCell {
                 spread(&held.map(|value| f64::from(*value)).collect::<Vec<_>>())
             }
             MapStatistic::Amplitude | MapStatistic::Phase => {
-                let annual = season(&self.periods, &as_f64(values)).ok()?.annual;
+                let find = || season(&self.periods, &as_f64(values)).ok();
+                let annual = &once(&mut shared.season, &self.read, find)?.annual;
                 Some(match self.statistic {
                     MapStatistic::Phase => annual.highest_after_days,
                     _ => annual.amplitude,
                 })
             }
-            MapStatistic::Trend | MapStatistic::TrendPValue => {
-                let found = trend(&self.periods, &as_f64(values), TimeStep::Month, "").ok()?;
-                Some(match self.statistic {
-                    MapStatistic::TrendPValue => found.mann_kendall.p_value,
-                    _ => found.theil_sen.slope_per_decade,
-                })
+            MapStatistic::Trend
+            | MapStatistic::TrendPValue
+            | MapStatistic::LeastSquaresTrend
+            | MapStatistic::LeastSquaresTrendPValue => {
+                let find = || trend(&self.periods, &as_f64(values), TimeStep::Month, "").ok();
+                let found = once(&mut shared.trend, &self.read, find)?;
+                match self.statistic {
+                    MapStatistic::TrendPValue => Some(found.mann_kendall.p_value),
+                    MapStatistic::LeastSquaresTrend => Some(found.least_squares.slope_per_decade),
+                    MapStatistic::LeastSquaresTrendPValue => found.least_squares.p_value,
+                    _ => Some(found.theil_sen.slope_per_decade),
+                }
             }
-            MapStatistic::Climatology | MapStatistic::Anomaly => None,
+            MapStatistic::Min | MapStatistic::MinTime => self.lowest(values, |value| value),
+            MapStatistic::Max | MapStatistic::MaxTime => self.lowest(values, |value| -value),
+            MapStatistic::Percentile(percentile) => self.percentile(values, percentile),
+            MapStatistic::Count
+            | MapStatistic::Coverage
+            | MapStatistic::Climatology
+            | MapStatistic::Anomaly => None,
         }
+    }
+
+    /// The value of the step that is lowest by some measure, or its middle in days of 1970; of equal ones the first.
+    fn lowest(&self, values: &[f32], by: impl Fn(f32) -> f32) -> Option<f64> {
+        let steps = self.periods.iter().zip(values);
+        let held = steps.filter(|(_, value)| !value.is_nan());
+        let (period, value) = held.min_by(|(_, a), (_, b)| by(**a).total_cmp(&by(**b)))?;
+        Some(match self.statistic {
+            MapStatistic::MinTime | MapStatistic::MaxTime => period.mid().ms() as f64 / DAY_MS,
+            // One zero: which of two comes first says nothing.
+            _ => f64::from(*value + 0.0),
+        })
+    }
+
+    /// The least value at or below which so much of the time with data lies, as statistics of a place have it.
+    fn percentile(&self, values: &[f32], percentile: Percentile) -> Option<f64> {
+        let steps = self.periods.iter().zip(values);
+        let held = steps.filter(|(_, value)| !value.is_nan());
+        let mut held: Vec<(f32, i128)> = held
+            .map(|(period, value)| (value + 0.0, i128::from(period.end.ms() - period.start.ms())))
+            .collect();
+        held.sort_unstable_by(|(a, _), (b, _)| a.total_cmp(b));
+        let all: i128 = held.iter().map(|(_, ms)| ms).sum();
+        let target = least_part(all, percentile);
+        let mut below = 0;
+        let found = held.iter().find(|(_, ms)| {
+            below += ms;
+            below >= target
+        });
+        found.map(|(value, _)| f64::from(*value))
     }
 }
 

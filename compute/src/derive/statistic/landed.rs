@@ -6,75 +6,69 @@ use contract::ContractError;
 use contract::analysis::MapStatistic;
 use contract::manifest::{MANIFEST_SCHEMA, Manifest, Step};
 use contract::product::ProductId;
+use contract::time::Period;
 use rayon::prelude::*;
-use storage::{Store, domain, fields};
+use storage::{domain, fields};
 
 use super::super::{DeriveProgress, Progress};
 use super::blocks::Blocks;
-use super::cells::OfCell;
-use super::plan::Plan;
+use super::cells::OfCells;
+use super::plan::{Output, Plan};
+use super::wanted::Wanted;
 use crate::{ComputeError, Engine};
 
-/// Values of all steps that are computed together: 512 MiB of f64.
-const MOST_VALUES: usize = 64 << 20;
+/// Share of the memory for work that the values of all outputs take.
+const COMPUTED_SHARE: usize = 2;
 
-/// Computes and stores everything but the manifest, which is returned with number 0.
-pub(super) async fn land(
-    engine: &Engine,
-    source: &Manifest,
-    target: &ProductId,
-    plan: &Plan,
-    progress: &Progress<'_>,
-) -> Result<Manifest, ComputeError> {
-    let all = computed(engine, source, plan, progress).await?;
-    // Bins are kept in the order of the calendar, which is that of their periods.
-    let store = engine.store();
-    let mut steps = vec![];
-    let mut found = Found::nothing(source.grid.cell_count());
-    for (output, values) in plan.outputs.iter().zip(all) {
-        let values: Vec<f32> = values
-            .iter()
-            .map(|value| (value * plan.factor) as f32)
-            .collect();
-        steps.push(step(store, source, target, output, &values).await?);
-        found.add(&values);
-    }
-    manifest(store, source, target, plan, steps, &found).await
+/// A statistic that was computed, to be stored.
+pub(super) struct Landing<'a> {
+    pub(super) engine: &'a Engine,
+    pub(super) source: &'a Manifest,
+    pub(super) target: &'a ProductId,
+    pub(super) plan: &'a Plan,
+    pub(super) wanted: &'a Wanted,
 }
 
-/// A statistic of every cell, `[output][row, col]`, stored unit, NaN where there is none.
+/// Statistics of every cell that is wanted, by statistic `[output][row, col]`, stored unit, NaN where there is none.
 pub(super) async fn computed(
     engine: &Engine,
     source: &Manifest,
-    plan: &Plan,
+    plans: &[Plan],
+    wanted: &Wanted,
     progress: &Progress<'_>,
-) -> Result<Vec<Vec<f64>>, ComputeError> {
-    let periods = source.steps[plan.read.clone()]
-        .iter()
-        .map(|step| step.period);
-    let of_cell = Arc::new(OfCell::new(plan, periods.collect()));
-    let outputs = of_cell.output_count();
+) -> Result<Vec<Vec<Vec<f64>>>, ComputeError> {
+    if plans.is_empty() {
+        return Ok(vec![]);
+    }
+    let periods: Vec<Period> = source.steps.iter().map(|step| step.period).collect();
+    let of_cells = Arc::new(OfCells::new(plans, &periods));
+    let counts = of_cells.output_counts();
+    let outputs: usize = counts.iter().sum();
     let cell_count = source.grid.cell_count();
-    if outputs.saturating_mul(cell_count) > MOST_VALUES {
+    let most = engine.memory_bytes() / COMPUTED_SHARE / size_of::<f64>();
+    if outputs.saturating_mul(cell_count) > most {
         let reason = format!(
-            "{outputs} steps of {cell_count} cells are more than the {MOST_VALUES} values that are held at once"
+            "{outputs} steps of {cell_count} cells are more than the {most} values that are held at once: ask for fewer at a time, or give it more memory (--memory-mib)"
         );
-        let name = plan.statistic.as_str();
-        return Err(ContractError::invalid("statistic", name, reason).into());
+        let name = plans[0].statistic.to_string();
+        return Err(ContractError::invalid("statistic", &name, reason).into());
     }
     let mut all = vec![vec![f64::NAN; cell_count]; outputs];
-    let blocks = Blocks::of(source);
+    let blocks = Blocks::of(source, wanted, engine.memory_bytes());
     let values = engine.values(source, &source.id()).await?;
     let step_count = source.steps.len();
+    let all_cells = wanted.count(0..cell_count);
     let mut done = 0;
     for run in blocks.runs() {
         let cells = blocks.read(&values, source, run).await?;
-        let (of_cell, read) = (Arc::clone(&of_cell), plan.read.clone());
+        let of_cells = Arc::clone(&of_cells);
+        let is_wanted: Vec<bool> = cells.places.iter().map(|place| wanted.is(*place)).collect();
         let computing = move || {
             let mut found = vec![f64::NAN; cells.places.len() * outputs];
-            let each = found.par_chunks_mut(outputs);
+            let each = found.par_chunks_mut(outputs).zip(&is_wanted);
             each.zip(cells.values.par_chunks(step_count))
-                .for_each(|(out, values)| of_cell.write(&values[read.clone()], out));
+                .filter(|((_, is_wanted), _)| **is_wanted)
+                .for_each(|((out, _), values)| of_cells.write(values, out));
             (cells.places, found)
         };
         let computed = tokio::task::spawn_blocking(computing).await;
@@ -84,32 +78,104 @@ pub(super) async fn computed(
                 output[*place] = *value;
             }
         }
-        done += places.len();
+        done += wanted.count(places.into_iter());
         progress(DeriveProgress {
             done_steps: done,
-            all_steps: cell_count,
+            all_steps: all_cells,
         });
     }
-    Ok(all)
+    let mut all = all.into_iter();
+    let by_plan = counts
+        .into_iter()
+        .map(|count| all.by_ref().take(count).collect());
+    Ok(by_plan.collect())
 }
 
-/// Stores one step.
-pub(super) async fn step(
-    store: &Store,
-    source: &Manifest,
-    target: &ProductId,
-    output: &super::plan::Output,
-    values: &[f32],
-) -> Result<Step, ComputeError> {
-    Ok(Step {
-        masked: None,
-        period: output.period,
-        field: fields::write(store, target, &source.grid, values, output.period).await?,
-        raw_sha256: output.made_of,
-        origin: output.origin.clone(),
-        valid_cells: values.iter().filter(|value| !value.is_nan()).count() as u64,
-        contributed: None,
-    })
+impl Landing<'_> {
+    /// Stores everything but the manifest, which is returned with number 0; of bins one after the other, in the order of the
+    /// calendar, which is that of their periods.
+    pub(super) async fn each(&self, all: Vec<Vec<f64>>) -> Result<Manifest, ComputeError> {
+        let mut steps = vec![];
+        let mut found = Found::nothing(self.source.grid.cell_count());
+        for (output, values) in self.plan.outputs.iter().zip(all) {
+            let values: Vec<f32> = values
+                .iter()
+                .map(|value| (value * self.plan.factor) as f32)
+                .collect();
+            steps.push(self.step(output, &values).await?);
+            found.add(&values);
+        }
+        self.manifest(steps, &found).await
+    }
+
+    /// Stores one step.
+    pub(super) async fn step(&self, output: &Output, values: &[f32]) -> Result<Step, ComputeError> {
+        let (store, grid) = (self.engine.store(), &self.source.grid);
+        Ok(Step {
+            masked: None,
+            period: output.period,
+            field: fields::write(store, self.target, grid, values, output.period).await?,
+            raw_sha256: output.made_of,
+            origin: output.origin.clone(),
+            valid_cells: values.iter().filter(|value| !value.is_nan()).count() as u64,
+            contributed: None,
+        })
+    }
+
+    /// The manifest, with number 0.
+    pub(super) async fn manifest(
+        &self,
+        steps: Vec<Step>,
+        found: &Found,
+    ) -> Result<Manifest, ComputeError> {
+        let Self {
+            source,
+            target,
+            plan,
+            ..
+        } = *self;
+        if !found.cells.contains(&true) {
+            let name = plan.statistic.to_string();
+            return Err(ContractError::invalid("statistic", &name, self.nothing()).into());
+        }
+        Ok(Manifest {
+            schema: MANIFEST_SCHEMA,
+            product: target.clone(),
+            number: 0,
+            title: format!("{}, {}", source.title, plan.title),
+            quantity: plan.quantity.over(found.range)?,
+            synthetic: source.synthetic,
+            source: source.source.clone(),
+            grid: source.grid,
+            steps,
+            domain: domain::write(self.engine.store(), target, &found.cells).await?,
+            series: vec![],
+            derived_from: Some(source.id()),
+            computed: None,
+            notices: vec![],
+        })
+    }
+
+    /// Why no cell has a value.
+    fn nothing(&self) -> String {
+        let reason = match self.plan.statistic {
+            MapStatistic::Trend
+            | MapStatistic::TrendPValue
+            | MapStatistic::LeastSquaresTrend
+            | MapStatistic::LeastSquaresTrendPValue => {
+                "has the ten values and five years that a trend needs"
+            }
+            MapStatistic::Amplitude | MapStatistic::Phase => {
+                "has the eight values in different parts of a year that a season needs"
+            }
+            _ => "holds data in as much of the time as is asked for",
+        };
+        let place = match self.wanted {
+            Wanted::All => "",
+            Wanted::Some(_) => " of the region",
+        };
+        format!("no cell{place} {reason}")
+    }
 }
 
 /// What all steps together hold.
@@ -137,44 +203,12 @@ impl Found {
             }
         }
     }
-}
 
-/// The manifest of a statistic, with number 0.
-pub(super) async fn manifest(
-    store: &Store,
-    source: &Manifest,
-    target: &ProductId,
-    plan: &Plan,
-    steps: Vec<Step>,
-    found: &Found,
-) -> Result<Manifest, ComputeError> {
-    if !found.cells.contains(&true) {
-        let reason = match plan.statistic {
-            MapStatistic::Trend | MapStatistic::TrendPValue => {
-                "no cell has the ten values and five years that a trend needs"
-            }
-            MapStatistic::Amplitude | MapStatistic::Phase => {
-                "no cell has the eight values in different parts of a year that a season needs"
-            }
-            _ => "no cell holds data in as much of the time as is asked for",
-        };
-        let name = plan.statistic.as_str();
-        return Err(ContractError::invalid("statistic", name, reason).into());
+    pub(super) fn merge(&mut self, other: &Self) {
+        for (own, other) in self.cells.iter_mut().zip(&other.cells) {
+            *own |= other;
+        }
+        let ([low, high], [other_low, other_high]) = (self.range, other.range);
+        self.range = [low.min(other_low), high.max(other_high)];
     }
-    Ok(Manifest {
-        schema: MANIFEST_SCHEMA,
-        product: target.clone(),
-        number: 0,
-        title: format!("{}, {}", source.title, plan.title),
-        quantity: plan.quantity.over(found.range)?,
-        synthetic: source.synthetic,
-        source: source.source.clone(),
-        grid: source.grid,
-        steps,
-        domain: domain::write(store, target, &found.cells).await?,
-        series: vec![],
-        derived_from: Some(source.id()),
-        computed: None,
-        notices: vec![],
-    })
 }

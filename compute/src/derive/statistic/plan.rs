@@ -8,6 +8,7 @@ use contract::digest::Digest;
 use contract::key::ObjectKey;
 use contract::manifest::{Manifest, Step};
 use contract::quantity::Quantity;
+use contract::region::Region;
 use contract::time::Period;
 use serde::Serialize;
 
@@ -51,6 +52,8 @@ struct MadeOf<'a> {
     kind: &'static str,
     method: u32,
     options: &'a MapOptions,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    region: Option<&'a Region>,
     base: BasePeriod,
     output: usize,
     read: &'a [(Period, &'a ObjectKey)],
@@ -85,7 +88,13 @@ impl Plan {
             first_written: ranges.inside.start,
             quantity,
             factor,
-            title: format!("{title}, where {least} % or more hold data"),
+            title: match &options.region {
+                Some(asked) => format!(
+                    "{title} in {}, where {least} % or more hold data",
+                    asked.name
+                ),
+                None => format!("{title}, where {least} % or more hold data"),
+            },
         })
     }
 
@@ -154,6 +163,7 @@ fn outputs(
             kind: "statistic",
             method: METHOD,
             options,
+            region: options.region.as_ref().map(|asked| &asked.region),
             base,
             output,
             read: &inputs,
@@ -222,7 +232,7 @@ fn check_steps(
     let refused = |reason: String| {
         Err(ContractError::invalid(
             "statistic",
-            statistic.as_str(),
+            &statistic.to_string(),
             reason,
         ))
     };

@@ -13,7 +13,20 @@ pub(super) fn of(own: Quantity, statistic: MapStatistic) -> Result<(Quantity, f6
     let display = own.display();
     let unit = plain_unit(display.unit);
     let (word, unit, says, factor) = match statistic {
-        MapStatistic::Mean | MapStatistic::Climatology => return Ok((own, 1.0)),
+        MapStatistic::Mean
+        | MapStatistic::Min
+        | MapStatistic::Max
+        | MapStatistic::Percentile(_)
+        | MapStatistic::Climatology => return Ok((own, 1.0)),
+        MapStatistic::MinTime | MapStatistic::MaxTime => {
+            let (word, says) = match statistic {
+                MapStatistic::MinTime => ("min_time", "lowest days after the start of 1970"),
+                _ => ("max_time", "highest days after the start of 1970"),
+            };
+            (word, "day".to_owned(), says, 1.0)
+        }
+        MapStatistic::Count => ("count", "1".to_owned(), "steps with data", 1.0),
+        MapStatistic::Coverage => ("coverage", "%".to_owned(), "share of time with data", 1.0),
         MapStatistic::Anomaly => ("anomaly", unit, "anomaly", display.factor),
         MapStatistic::Spread => (
             "standard_deviation",
@@ -33,15 +46,25 @@ pub(super) fn of(own: Quantity, statistic: MapStatistic) -> Result<(Quantity, f6
             "highest days after the start of the year",
             1.0,
         ),
-        MapStatistic::Trend => {
+        MapStatistic::Trend | MapStatistic::LeastSquaresTrend => {
             let a_year = if unit == "1" {
                 "year-1".to_owned()
             } else {
                 format!("{unit} year-1")
             };
-            ("trend", a_year, "trend", display.factor / DECADE)
+            let (word, says) = match statistic {
+                MapStatistic::Trend => ("trend", "trend"),
+                _ => ("least_squares_trend", "trend by least squares"),
+            };
+            (word, a_year, says, display.factor / DECADE)
         }
         MapStatistic::TrendPValue => ("trend_p_value", "1".to_owned(), "p value of its trend", 1.0),
+        MapStatistic::LeastSquaresTrendPValue => (
+            "least_squares_trend_p_value",
+            "1".to_owned(),
+            "p value of its trend by least squares",
+            1.0,
+        ),
     };
     let name = format!("{}_{word}", own.word());
     let title = format!("{}, {says}", own.title());
