@@ -30,7 +30,7 @@ impl Client {
                 let site = u128::from(own) >> 64 << 64;
                 IpAddr::V6(Ipv6Addr::from(site))
             }
-            own => own,
+            IpAddr::V4(own) => IpAddr::V4(own),
         })
     }
 
