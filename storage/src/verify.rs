@@ -175,7 +175,9 @@ async fn check(store: &Store, key: &ObjectKey) -> Result<Checked, StorageError> 
         Ok((soundness, bytes)) => Ok(Checked::Sound(soundness, bytes)),
         Err(e) if e.is_not_found() => Ok(Checked::Gone),
         // Of an attached product, and not what was attached any more.
-        Err(e) if !e.is_retryable() && e.attached().is_some() => Ok(Checked::Damaged(e.to_string())),
+        Err(e) if !e.is_retryable() && e.attached().is_some() => {
+            Ok(Checked::Damaged(e.to_string()))
+        }
         Err(StorageError::Damaged { reason, .. }) => Ok(Checked::Damaged(reason)),
         Err(e) => Err(e),
     }

@@ -15,11 +15,11 @@ use storage::attached::Reference;
 
 use super::kept::Kept;
 use crate::check::{CheckedBand, Found};
+use crate::decode;
 use crate::decode::DecodedBand;
 use crate::error::{IngestError, Stop};
 use crate::limits::{Limits, memory};
 use crate::plan::{Plan, PlannedStep};
-use crate::decode;
 
 /// What all steps came to.
 #[derive(Default)]
