@@ -39,6 +39,11 @@ impl Domain {
         })
     }
 
+    /// Is it of this grid? It is kept under its content, which says nothing of the grid of another job.
+    pub(super) fn is_of(&self, grid: &Grid) -> bool {
+        self.grid == *grid
+    }
+
     /// How many of some cells side by side hold data.
     fn count(&self, row: u32, cols: std::ops::Range<u32>) -> u32 {
         let first = row as usize * self.row_words;

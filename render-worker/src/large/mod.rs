@@ -87,6 +87,8 @@ impl Large {
         terrain: Option<Terrain>,
     ) -> Result<Scene, DrawError> {
         let grid = &job.grid;
+        // Before anything is laid out or read for as many cells as the job claims that there are.
+        self.domain(grid, &job.value.domain).await?;
         let carbon = match &job.accumulated {
             Some(sample) => Some(self.range(grid, sample).await?),
             None => None,
@@ -168,13 +170,8 @@ impl Large {
         })
     }
 
-    /// How much of each cell of a window holds data in some step.
-    async fn shares(
-        &self,
-        grid: &Grid,
-        key: &ObjectKey,
-        choice: &Choice,
-    ) -> Result<Vec<u32>, DrawError> {
+    /// Which cells of a grid hold data in some step; refused if it is of another number of cells.
+    async fn domain(&self, grid: &Grid, key: &ObjectKey) -> Result<Arc<Domain>, DrawError> {
         let reading = async {
             let read = storage::domain::read(&self.store, key).await;
             let flags = read.map_err(|source| DrawError::Store {
@@ -186,6 +183,21 @@ impl Large {
             domain.map(Arc::new).ok_or_else(|| DrawError::mismatch(key))
         };
         let domain = self.domains.get_or_insert_async(key, reading).await?;
+        if domain.is_of(grid) {
+            Ok(domain)
+        } else {
+            Err(DrawError::mismatch(key))
+        }
+    }
+
+    /// How much of each cell of a window holds data in some step.
+    async fn shares(
+        &self,
+        grid: &Grid,
+        key: &ObjectKey,
+        choice: &Choice,
+    ) -> Result<Vec<u32>, DrawError> {
+        let domain = self.domain(grid, key).await?;
         let choice = *choice;
         let counting = tokio::task::spawn_blocking(move || domain.shares(&choice));
         counting.await.map_err(DrawError::Thread)
