@@ -198,7 +198,9 @@ mod tests {
         assert_eq!(decode(&key, content).unwrap(), chunks);
         assert!(Arc::ptr_eq(&shared[0].1, &shared[199].1));
         let mut sharing = Sharing::default();
-        chunks.iter().for_each(|(_, areas)| drop(sharing.of(areas)));
+        for (_, areas) in &chunks {
+            drop(sharing.of(areas));
+        }
         assert_eq!(sharing.distinct_bytes(), 2 * 8 * 7200);
         // No zero is held for another one.
         let zeros = [sharing.of(&[0.0]), sharing.of(&[-0.0])];

@@ -85,10 +85,9 @@ impl Shares {
         grid: &Grid,
         chunks: &[(u32, SharedAreas)],
         values: &[f32],
-        found: &mut Found,
     ) -> Result<Vec<(u32, SharedAreas)>, ComputeError> {
         let windows = field_chunks(grid);
-        let mut unknown = 0u64;
+        let (mut unknown, mut found) = (0u64, Found::default());
         for (chunk, areas_m2) in chunks {
             let mut areas_m2 = areas_m2.to_vec();
             let cells = windows[*chunk as usize].cell_indices(grid);
@@ -111,7 +110,7 @@ impl Shares {
                 ),
             });
         }
-        Ok(std::mem::take(&mut found.chunks))
+        Ok(found.chunks)
     }
 }
 
@@ -186,13 +185,14 @@ mod tests {
     fn land_and_sea_are_the_two_parts_of_a_cell() {
         let field: ObjectKey = "frames/mask/a".parse().unwrap();
         let mut values = vec![0.25; 32];
-        let areas = vec![(0, [vec![100.0; 31], vec![0.0]].concat())];
+        let areas: SharedAreas = [vec![100.0; 31], vec![0.0]].concat().into();
+        let areas = [(0, areas)];
         values[31] = f32::NAN; // outside of the region
         let shares = |of| Shares {
             field: field.clone(),
             of,
         };
-        let weigh = |of, values: &[f32]| shares(of).weigh(&GRID, areas.clone(), values);
+        let weigh = |of, values: &[f32]| shares(of).weigh(&GRID, &areas, values);
         assert_eq!(
             weigh(Of::Sea, &values).unwrap()[0].1[3].to_bits(),
             25.0f64.to_bits()

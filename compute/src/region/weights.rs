@@ -171,7 +171,7 @@ pub(crate) fn shared_of(
             ComputeError::inconsistent(own.field.as_str(), "it was not read, or is of another grid")
         })?;
         let all = shared_of(grid, region, earth, &Surface::All, None)?;
-        return own.weigh(grid, &all, values, &mut Found::default());
+        return own.weigh(grid, &all, values);
     }
     let bounds = match region {
         _ if *surface == Surface::Ocean => {
