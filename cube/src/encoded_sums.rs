@@ -7,9 +7,9 @@ use futures::future::BoxFuture;
 
 use crate::blocks::ChunkDecoder;
 use crate::record::{RECORD_BYTES, Record};
-use crate::stored_chunks::StoredChunks;
+use crate::stored_chunks::{StoredChunks, Undecoded};
 use crate::sums::Basis;
-use crate::values::{Piece, Undecoded, Values};
+use crate::values::{Piece, Values};
 use crate::{Cube, CubeError};
 
 /// Records of sums of a run of steps, read and not decoded yet.

@@ -71,6 +71,7 @@ pub use plain::PlainZarr;
 pub use reader::{Cube, LevelWindow};
 pub use record::Record;
 pub use repository::{At, Repository};
+pub use stored_chunks::Undecoded;
 pub use sums::Basis;
-pub use values::{Block, EncodedBlocks, Piece, Undecoded, Values};
+pub use values::{Block, EncodedBlocks, Piece, Values};
 pub use windows::CellAt;

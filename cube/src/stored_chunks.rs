@@ -10,9 +10,11 @@ use std::path::PathBuf;
 
 use bytes::Bytes;
 
-use crate::values::Undecoded;
-
 pub(crate) const TOO_SHORT: &str = "its shard is shorter than its index says";
+
+/// A chunk that cannot be read or decoded: its place among those asked for, and why.
+#[derive(Debug)]
+pub struct Undecoded(pub(crate) usize, pub(crate) String);
 
 /// A part of a shard, with chunks that lie near one another.
 #[derive(Debug)]

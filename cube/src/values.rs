@@ -22,7 +22,7 @@ use crate::field_bands::FieldBands;
 use crate::follow::folder;
 use crate::joined::joined_window;
 use crate::layout::{BLOCK_CELLS, RUN_STEPS};
-use crate::stored_chunks::StoredChunks;
+use crate::stored_chunks::{StoredChunks, Undecoded};
 use crate::{At, Cube, CubeError, LevelWindow, Repository};
 
 /// Runs that are read at a time.
@@ -115,10 +115,6 @@ pub struct EncodedBlocks {
     content: StoredChunks,
     pieces: Vec<Piece>,
 }
-
-/// A block that cannot be decoded: its place among those asked for, and why.
-#[derive(Debug)]
-pub struct Undecoded(pub(crate) usize, pub(crate) String);
 
 impl EncodedBlocks {
     /// Where the steps that were asked for lie in the run.
