@@ -3,6 +3,7 @@
 use std::ops::Range;
 use std::sync::Arc;
 
+use contract::chunk::BAND_CELLS;
 use contract::grid::Grid;
 use contract::key::ObjectKey;
 use futures::future::BoxFuture;
@@ -11,12 +12,18 @@ use storage::{Store, fields};
 use crate::bands::{Bands, WholeField};
 use crate::{Cube, CubeError};
 
-/// A field of a store, which is read when rows of it are first asked for, and compared with its name.
+/// A field of a store, which is read when rows of it are first asked for: one of a band whole, and compared with its name; a larger
+/// one row by row, each compared with its check.
 pub struct FieldBands {
     store: Store,
     field: ObjectKey,
     grid: Grid,
-    read: Option<WholeField>,
+    read: Option<Read>,
+}
+
+enum Read {
+    Whole(WholeField),
+    Rows(fields::Reader),
 }
 
 impl FieldBands {
@@ -29,18 +36,27 @@ impl FieldBands {
             read: None,
         }
     }
+
+    async fn open(&self) -> Result<Read, CubeError> {
+        if self.grid.cell_count() as u64 > BAND_CELLS {
+            let reader = fields::Reader::open(&self.store, &self.field, Some(&self.grid));
+            return Ok(Read::Rows(reader.await?));
+        }
+        let values = fields::read(&self.store, &self.field, &self.grid).await?;
+        let values: Arc<[f32]> = values.into();
+        Ok(Read::Whole(WholeField::new(values, self.grid.cols)))
+    }
 }
 
 impl Bands for FieldBands {
     fn rows(&mut self, rows: Range<u32>) -> BoxFuture<'_, Result<Vec<f32>, CubeError>> {
         Box::pin(async move {
             if self.read.is_none() {
-                let values = fields::read(&self.store, &self.field, &self.grid).await?;
-                let values: Arc<[f32]> = values.into();
-                self.read = Some(WholeField::new(values, self.grid.cols));
+                self.read = Some(self.open().await?);
             }
             match &mut self.read {
-                Some(read) => read.rows(rows).await,
+                Some(Read::Whole(read)) => read.rows(rows).await,
+                Some(Read::Rows(reader)) => Ok(reader.rows(rows).await?),
                 None => Ok(vec![]),
             }
         })
