@@ -175,7 +175,7 @@ async fn a_band_without_a_value_before_the_first_is_of_the_field() {
     let manifest = place.newest(manifest.product.as_str()).await;
     let values = place.values(&manifest, 0).await;
     assert_eq!(values.iter().filter(|v| !v.is_nan()).count(), 20 * COLS);
-    assert!(values[130 * COLS - 1].is_nan() && values[130 * COLS] == 4.0);
+    assert!(values[130 * COLS - 1].is_nan() && !values[130 * COLS].is_nan());
 }
 
 #[tokio::test]
