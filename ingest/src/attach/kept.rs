@@ -12,7 +12,7 @@ use storage::attached::{Attachment, Reference};
 
 use super::reading::Reading;
 use super::survey::Survey;
-use crate::decode::part;
+use crate::decode::Slab;
 use crate::error::{IngestError, Stop};
 use crate::inspect::arrays::{self, Arrays};
 use crate::plan::PlannedStep;
@@ -74,12 +74,9 @@ pub(super) async fn kept(
 fn ranges(foreign: &Foreign, survey: &Survey, step: PlannedStep) -> Result<Vec<Range<u64>>, Stop> {
     let array = foreign.array(&survey.attachment.array);
     let array = array.map_err(arrays::stopped)?;
-    let parts: Vec<_> = survey
-        .plan
-        .axes
-        .iter()
-        .map(|axis| part(axis, step))
-        .collect();
+    let plan = &survey.plan;
+    let slab = Slab::of(&plan.mapping, step, &(0..plan.mapping.grid.rows));
+    let parts: Vec<_> = plan.axes.iter().map(|axis| slab.part(axis)).collect();
     Ok(Arrays::ranges(array, &survey.indexes, &parts))
 }
 
