@@ -66,6 +66,34 @@ fn run(settings: &Settings, command: Command) -> anyhow::Result<ExitCode> {
 
 #[expect(clippy::print_stderr, reason = "the last word of a failed command")]
 fn failed(error: &anyhow::Error) -> ExitCode {
-    eprintln!("fluxglobe: {error:#}");
+    eprintln!("fluxglobe: {}", told(error));
     ExitCode::FAILURE
+}
+
+/// An error and its causes, each said once: layers of stores say what the ones below them said.
+fn told(error: &anyhow::Error) -> String {
+    let mut text = String::new();
+    for cause in error.chain().map(ToString::to_string) {
+        if !text.contains(&cause) {
+            let joint = if text.is_empty() { "" } else { ": " };
+            text = format!("{text}{joint}{cause}");
+        }
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cause_that_was_said_is_not_said_again() {
+        let error = anyhow::anyhow!("the disk is full");
+        let error = error
+            .context("writing a: the disk is full")
+            .context("landing b");
+        assert_eq!(told(&error), "landing b: writing a: the disk is full");
+        let error = anyhow::anyhow!("c").context("reading d");
+        assert_eq!(told(&error), "reading d: c");
+    }
 }

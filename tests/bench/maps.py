@@ -72,7 +72,7 @@ def fluxglobe(options, folder, product, ring):
     for statistic in STATISTICS:
         target = folder / f"{name}-{statistic}.zarr"
         span = ["--from", "2009", "--to", "2009-03"] if statistic == "anomaly" else []
-        tiles.run(options.program, "--data", folder / "data", "export", f"{name}-{statistic}", "--to", "zarr", *span, "--output", target)
+        tiles.run(options.program, "--data", folder / "data", "export", f"{name}-{statistic}", "--to", "zarr", target)
         found[statistic] = xr.open_zarr(target)
     return found, seconds
 
