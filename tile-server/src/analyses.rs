@@ -284,7 +284,7 @@ mod tests {
     async fn what_is_remembered_is_bounded_by_its_bytes() {
         let registry = crate::metrics::Registry::new();
         let metrics = Metrics::register(&registry).unwrap();
-        let gate = Gate::new(1, 1);
+        let gate = FairGate::new(1, 1, metrics.analyses_waiting.clone());
         let answers: Answers<Bytes> = Answers::new(4, 1000, text_bytes);
         for number in 0..50_u8 {
             let computed = async move { Ok::<_, ServerError>(Bytes::from(vec![number; 300])) };
