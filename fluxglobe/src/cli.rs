@@ -116,7 +116,7 @@ pub(crate) struct Settings {
     pub(crate) cluster_limit_s: u64,
     /// Memory that a question or a derivation in this process may take for what it works on, MiB, 64 to 1,048,576: values are read in
     /// as many pieces as that needs, and what cannot be had in pieces is refused. Answers are the same bits. The program itself and what
-    /// it remembers take some 200 MiB more; an executor has FLUXGLOBE_EXECUTOR_MEMORY_BYTES.
+    /// it remembers take some 200 MiB more; an executor has `FLUXGLOBE_EXECUTOR_MEMORY_BYTES`.
     #[arg(long, env = "FLUXGLOBE_MEMORY_MIB", global = true, value_name = "MIB", default_value_t = 1024,
           value_parser = clap::value_parser!(u32).range(64..=1 << 20))]
     pub(crate) memory_mib: u32,

@@ -87,13 +87,11 @@ pub(crate) async fn needed_log(
 /// Who works on whole products: the Ballista cluster that settings name, else Ballista in this process; it starts with
 /// its first query.
 pub(crate) fn engine(settings: &Settings, store: Store) -> Result<Engine> {
-    match &settings.cluster {
-        Some(scheduler) => cluster(settings, store, scheduler),
-        None => {
-            let engine = Engine::standalone(store, parts_in_process(settings, false));
-            Ok(engine.with_memory_bytes((settings.memory_mib as usize) << 20))
-        }
+    if let Some(scheduler) = &settings.cluster {
+        return cluster(settings, store, scheduler);
     }
+    let engine = Engine::standalone(store, parts_in_process(settings, false));
+    Ok(engine.with_memory_bytes((settings.memory_mib as usize) << 20))
 }
 
 /// Who sums over regions: the Ballista cluster that settings name, else DataFusion in this process, where a scheduler

@@ -117,27 +117,6 @@ async fn a_climatology_is_a_product_of_twelve_months() {
         }
         assert_eq!(derived(&engine, &options).await.unwrap(), made);
     }
-    // Nor does memory change a bit: blocks are read two by two.
-    let small = engine.clone().with_memory_bytes(160 << 10);
-    let name = Some(product("small"));
-    let of_small = MapOptions {
-        name,
-        ..options.clone()
-    };
-    let of_small = derived(&small, &of_small).await.unwrap();
-    let (a, b) = (
-        read(&store, &made, 6).await,
-        read(&store, &of_small, 6).await,
-    );
-    assert!(a.iter().zip(&b).all(|(a, b)| a.to_bits() == b.to_bits()));
-    let tiny = engine.clone().with_memory_bytes(64 << 10);
-    let name = Some(product("tiny"));
-    let refused = MapOptions {
-        name,
-        ..options.clone()
-    };
-    let refused = derived(&tiny, &refused).await.unwrap_err();
-    assert!(refused.to_string().contains("--memory-mib"), "{refused}");
     // One July more, and it is made anew.
     let mut more = steps();
     more[30].1[at(4, 0)] += 3.0;
@@ -532,4 +511,26 @@ async fn statistics_that_are_there_are_not_made_again_and_regions_that_do_not_fi
         assert!(refused.to_string().contains(reason), "{refused}");
         assert_eq!(refused.class(), ErrorClass::BadRequest);
     }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn memory_changes_no_bit_and_what_it_cannot_hold_is_refused() {
+    let (_folder, store) = folder_store();
+    landed(&store).await;
+    let engine = Engine::in_process(store.clone(), parts(2));
+    let of = |name: &str| of(MapStatistic::Climatology, None, name);
+    let roomy = derived(&engine, &of("roomy")).await.unwrap();
+    // Blocks are read two by two.
+    let small = engine.clone().with_memory_bytes(160 << 10);
+    let small = derived(&small, &of("small")).await.unwrap();
+    for month in 0..12 {
+        let (a, b) = (
+            read(&store, &roomy, month).await,
+            read(&store, &small, month).await,
+        );
+        assert!(a.iter().zip(&b).all(|(a, b)| a.to_bits() == b.to_bits()));
+    }
+    let tiny = engine.clone().with_memory_bytes(64 << 10);
+    let refused = derived(&tiny, &of("tiny")).await.unwrap_err();
+    assert!(refused.to_string().contains("--memory-mib"), "{refused}");
 }

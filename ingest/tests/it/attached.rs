@@ -204,6 +204,7 @@ async fn values_are_those_that_xarray_finds_and_nothing_is_written_there() {
 
 /// Our own cube of a landed product is an Icechunk store like any other.
 #[tokio::test]
+#[expect(clippy::too_many_lines, reason = "one story of a store that goes on")]
 async fn an_attached_cube_is_what_was_landed_digest_by_digest_and_stays_so() {
     let mut place = Place::new();
     place.store = Store::open(place.path("data").to_str().unwrap()).unwrap();
@@ -403,8 +404,8 @@ const FAULTS: [Fault; 12] = [
         "v2-plain.zarr",
         |own| {
             own.edit("sst/.zarray", |it| {
-                it["compressor"] = json!({"id": "lzma", "preset": 1})
-            })
+                it["compressor"] = json!({"id": "lzma", "preset": 1});
+            });
         },
         &["array sst", "lzma"],
     ),
@@ -412,8 +413,8 @@ const FAULTS: [Fault; 12] = [
         "v3-gzip.zarr",
         |own| {
             own.edit("sst/zarr.json", |it| {
-                it["codecs"][1]["name"] = json!("numcodecs.pcodec")
-            })
+                it["codecs"][1]["name"] = json!("numcodecs.pcodec");
+            });
         },
         &["array sst", "pcodec"],
     ),
@@ -438,8 +439,8 @@ const FAULTS: [Fault; 12] = [
         "v2-plain.zarr",
         |own| {
             own.edit("sst/.zattrs", |it| {
-                it["_ARRAY_DIMENSIONS"] = json!(["time", "y", "x"])
-            })
+                it["_ARRAY_DIMENSIONS"] = json!(["time", "y", "x"]);
+            });
         },
         &["sst"],
     ),
