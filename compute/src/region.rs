@@ -10,6 +10,7 @@ pub(crate) mod computed;
 mod cut;
 pub mod extent;
 pub mod file;
+mod found;
 mod lattice;
 pub(crate) mod line_cover;
 pub(crate) mod loaded;

@@ -25,7 +25,7 @@ struct MadeUp {
 }
 
 impl MadeUp {
-    fn value(&self, row: u32, col: u32) -> f32 {
+    fn value(row: u32, col: u32) -> f32 {
         let (y, x) = (f64::from(row) / 2000.0, f64::from(col) / 2000.0);
         let land = (x * 0.7 + (y * 1.3).sin()).sin() + (y * 0.9 + (x * 1.1).cos()).cos();
         let cloud = (x * 9.0 + (y * 7.0).sin()).sin() * (y * 11.0 + (x * 5.0).cos()).sin();
@@ -43,7 +43,7 @@ impl MadeUp {
 impl Bands for MadeUp {
     fn rows(&mut self, rows: Range<u32>) -> BoxFuture<'_, Result<Vec<f32>, CubeError>> {
         let cells = rows.flat_map(|row| (0..self.cols).map(move |col| (row, col)));
-        let values = cells.map(|(row, col)| self.value(row, col)).collect();
+        let values = cells.map(|(row, col)| Self::value(row, col)).collect();
         async move { Ok(values) }.boxed()
     }
 }

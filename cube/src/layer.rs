@@ -16,7 +16,7 @@ use crate::parts::{Parts, Track};
 use crate::plan::Plan;
 use crate::staged::AllStaged;
 use crate::state::State;
-use crate::{CubeError, Description, Repository, Step, arrays, axis, plain};
+use crate::{CubeError, Description, Repository, Step, arrays, axis, group, plain};
 
 /// Where a chunk comes to lie in an array, and what it refers to; none where no cell has data.
 type Placed = (Path, ChunkIndices, Option<ChunkPayload>);
@@ -53,7 +53,7 @@ impl Layer<'_> {
             (state.steps.len(), self.moved().await?)
         };
         if !is_anew && state.description.as_ref() != Some(description) {
-            plain::write_group(&arrays, "", levels::with_levels(description)).await?;
+            group::write_group(&arrays, "", levels::with_levels(description)).await?;
         }
         if plan.steps.len() < before {
             self.cut_off().await?;

@@ -19,7 +19,7 @@ use crate::arrays::{self, Definition, LEVELS};
 use crate::error::first_lines;
 use crate::joining::Method;
 use crate::rounding::KEPT_BITS;
-use crate::{CubeError, Description, Step, axis, cf, names, plain};
+use crate::{CubeError, Description, Step, axis, cf, group, names, plain};
 
 /// Version of what levels hold: those of another are not read, and made anew.
 const LAYOUT: u32 = 1;
@@ -117,13 +117,13 @@ impl Levels {
             gone.map_err(|e| CubeError::library(LEVELS, "removing", e))?;
         }
         if !self.is_there {
-            plain::write_group(store, "", with_levels(description)).await?;
-            plain::write_group(store, LEVELS, attributes(description)).await?;
+            group::write_group(store, "", with_levels(description)).await?;
+            group::write_group(store, LEVELS, attributes(description)).await?;
         }
         for level in level::levels(&description.grid) {
             if !self.is_there {
                 let group = arrays::level_group(&level);
-                plain::write_group(store, &group, level_attributes(description, &level)).await?;
+                group::write_group(store, &group, level_attributes(description, &level)).await?;
                 plain::write_fixed(store, arrays::level_fixed(description, &level)?).await?;
             }
             let values = arrays::level_values(description, &level, steps as u64)?;

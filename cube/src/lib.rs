@@ -22,6 +22,7 @@ mod field;
 mod field_bands;
 mod follow;
 pub mod foreign;
+mod group;
 mod joined;
 mod joining;
 mod keys;

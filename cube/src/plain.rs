@@ -9,16 +9,16 @@ use contract::key::ObjectKey;
 use contract::time::Period;
 use futures::future::BoxFuture;
 use futures::stream::{self, StreamExt as _, TryStreamExt as _};
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 use storage::Store;
 use zarrs::array::ArrayBytes;
-use zarrs::group::{Group, GroupBuilder};
 use zarrs::storage::{
     AsyncWritableStorageTraits, OffsetBytesIterator, StorageError, StoreKey, StorePrefix,
 };
 
 use crate::arrays::{self, Fixed};
 use crate::field::{EncodedObject, Encoder, Number};
+use crate::group::{group, write_group};
 use crate::{CubeError, Description, Step, axis};
 
 /// Objects of a field that are encoded and sent at a time.
@@ -63,19 +63,6 @@ where
     Ok(())
 }
 
-/// Writes a group: the one of all, whose name is empty, says what the arrays are of.
-pub(crate) async fn write_group<S>(
-    store: &Arc<S>,
-    name: &str,
-    attributes: Map<String, Value>,
-) -> Result<(), CubeError>
-where
-    S: AsyncWritableStorageTraits + 'static,
-{
-    let stored = group(store, name, attributes)?.async_store_metadata().await;
-    stored.map_err(|e| CubeError::library(&format!("the group {name:?}"), "writing", e))
-}
-
 /// Writes of how many steps the values are.
 pub(crate) async fn write_length<S>(
     store: &Arc<S>,
@@ -89,17 +76,6 @@ where
     let array = values.with_storage(Arc::clone(store));
     let stored = array.async_store_metadata().await;
     stored.map_err(|e| CubeError::library(&arrays::name(&array), "writing", e))
-}
-
-fn group<S>(
-    store: &Arc<S>,
-    name: &str,
-    attributes: Map<String, Value>,
-) -> Result<Group<S>, CubeError> {
-    let mut builder = GroupBuilder::new();
-    builder.attributes(attributes);
-    let built = builder.build(Arc::clone(store), &format!("/{name}"));
-    built.map_err(|e| CubeError::library(&format!("the group {name:?}"), "defining it", e))
 }
 
 /// Plain Zarr as it is being written.

@@ -14,7 +14,7 @@ use zarrs::storage::{AsyncReadableStorageTraits, AsyncWritableStorageTraits};
 
 use crate::arrays::{self, Definition};
 use crate::layout::RUN_STEPS;
-use crate::{CubeError, Step, names, plain};
+use crate::{CubeError, Step, group, names};
 
 /// So many steps more are worth making the last run anew.
 const LEAST_NEW: usize = 16;
@@ -124,7 +124,7 @@ impl Runs {
     where
         S: AsyncWritableStorageTraits + 'static,
     {
-        plain::write_group(store, name, attributes).await?;
+        group::write_group(store, name, attributes).await?;
         let array = array.with_storage(Arc::clone(store));
         let stored = array.async_store_metadata().await;
         stored.map_err(|e| CubeError::library(name, "writing", e))?;

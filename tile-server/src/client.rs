@@ -7,8 +7,6 @@ use axum::http::{HeaderMap, HeaderName};
 use axum::middleware::Next;
 use axum::response::Response;
 
-use crate::state::AppState;
-
 tokio::task_local! {
     /// Of the request that this task answers.
     static ASKING: Client;
@@ -49,15 +47,14 @@ impl Client {
     }
 }
 
-/// Remembers who asks while a request is answered.
+/// Remembers who asks while a request is answered; `header` is that of a proxy that tells.
 pub(crate) async fn remember(
-    State(state): State<AppState>,
+    State(header): State<Option<HeaderName>>,
     request: Request,
     next: Next,
 ) -> Response {
     let peer = request.extensions().get::<Client>().copied();
-    let told = state.settings.client_header.as_ref();
-    let told = told.and_then(|name| Client::told(request.headers(), name));
+    let told = header.and_then(|name| Client::told(request.headers(), &name));
     match told.or(peer) {
         Some(client) => ASKING.scope(client, next.run(request)).await,
         None => next.run(request).await,

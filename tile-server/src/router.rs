@@ -61,7 +61,10 @@ pub fn router(state: AppState) -> Router {
         .layer(HandleErrorLayer::new(timed_out))
         .layer(TimeoutLayer::new(Duration::from_secs(limit_s)))
         .layer(from_fn(body::limit))
-        .layer(from_fn_with_state(state.clone(), client::remember));
+        .layer(from_fn_with_state(
+            state.settings.client_header.clone(),
+            client::remember,
+        ));
     Router::new()
         .route("/tiles/{product}/{mode_json}", get(tilejson::get))
         .route("/tiles/{product}/{mode}/{z}/{x}/{y_png}", get(tiles::get))

@@ -19,7 +19,7 @@ use super::accumulator::{Accumulated, too_large};
 use super::bins::{BinSums, bin_sums};
 use super::percentiles::Searches;
 use super::question::{Question, Wanted};
-use super::run::{changed_meanwhile, run};
+use super::run::{changed_meanwhile, opened, run};
 use super::tasks::Version;
 use super::weighed::Weighed;
 use crate::budget::rows::coverage_percent;
@@ -53,7 +53,7 @@ pub fn statistics_of<'a>(
             engine,
             manifest,
             id: &id,
-            values: engine.values(manifest, &id).await?,
+            values: opened(engine, manifest, &id).await?,
             weighed: &weighed,
             steps: first as u32..(first + inside.len()) as u32,
             scale: Scale::of_all(),
@@ -149,8 +149,8 @@ struct Reduction<'a> {
     manifest: &'a Manifest,
     /// The name of the version, which is costly to compute.
     id: &'a ManifestId,
-    /// The version along time.
-    values: Values,
+    /// The version along time, where it can be opened.
+    values: Option<Values>,
     weighed: &'a Weighed,
     /// Steps that reach into the period.
     steps: Range<u32>,
@@ -166,7 +166,7 @@ impl Reduction<'_> {
             store: self.engine.store(),
             manifest: self.manifest,
             id: self.id,
-            values: Some(&self.values),
+            values: self.values.as_ref(),
         };
         let [whole, covered] = weighed.addresses.clone();
         let question = Question {
@@ -194,7 +194,7 @@ impl Reduction<'_> {
             new.extend(name.map(|name| (name, run.steps)));
         }
         if !pieces.is_empty() {
-            let values = Some(self.values.clone());
+            let values = self.values.clone();
             let Some(found) = run(self.engine, question.clone(), values, pieces).await? else {
                 return self.of_fields_alone(version, question).await;
             };

@@ -9,7 +9,7 @@ use cube::weight_unit::WeightUnit;
 use super::cells::Cells;
 use super::question::{Question, Wanted};
 use super::region_sums::RegionStepSums;
-use super::run::{changed_meanwhile, run};
+use super::run::{changed_meanwhile, opened, run};
 use super::tasks::Version;
 use crate::budget::Measure;
 use crate::region::loaded::RegionWeights;
@@ -44,12 +44,12 @@ pub(crate) async fn sums_over_region(
     };
     let at: Vec<usize> = steps.iter().map(at).collect::<Result<_, _>>()?;
     let id = manifest.id();
-    let values = engine.values(manifest, &id).await?;
+    let values = opened(engine, manifest, &id).await?;
     let version = Version {
         store: engine.store(),
         manifest,
         id: &id,
-        values: Some(&values),
+        values: values.as_ref(),
     };
     let shape = [manifest.grid.rows, manifest.grid.cols];
     let unit = WeightUnit::default();
@@ -81,7 +81,7 @@ pub(crate) async fn sums_over_region(
             runs.flat_map(|run| run.pieces).collect()
         };
         let along_time = pieces(version);
-        let along_time = run(engine, question.clone(), Some(values.clone()), along_time);
+        let along_time = run(engine, question.clone(), values.clone(), along_time);
         let found = if let Some(found) = along_time.await? {
             found
         } else {

@@ -6,6 +6,7 @@ use std::collections::BTreeSet;
 
 use contract::digest::Digest;
 use contract::key::ObjectKey;
+use contract::manifest::{Manifest, ManifestId};
 use cube::Values;
 use datafusion::arrow::array::{Array as _, AsArray as _, RecordBatch};
 use futures::{StreamExt as _, TryStreamExt as _, stream};
@@ -30,6 +31,22 @@ pub(super) async fn run(
         distributed(engine, question, pieces).await
     } else {
         in_process(engine, question, values, pieces).await.map(Some)
+    }
+}
+
+/// The version along time. A cluster, whose executors can do without it, is asked for fields where its cube cannot be read: others land
+/// in it and clean it up meanwhile.
+pub(super) async fn opened(
+    engine: &Engine,
+    manifest: &Manifest,
+    id: &ManifestId,
+) -> Result<Option<Values>, ComputeError> {
+    match engine.values(manifest, id).await {
+        Err(error) if engine.is_distributed() && !error.is_retryable() => {
+            tracing::warn!(version = %id, %error, "its cube cannot be read: its fields are");
+            Ok(None)
+        }
+        opened => opened.map(Some),
     }
 }
 

@@ -70,7 +70,13 @@ impl Task {
     pub(crate) async fn run(self, objects: &Objects) -> Result<Option<Accumulated>, ComputeError> {
         let is_along_time = |piece: &Piece| matches!(piece.layout, Layout::Blocks | Layout::Sums);
         let values = if self.pieces.iter().any(is_along_time) {
-            objects.values(&self.question.version).await?
+            match objects.values(&self.question.version).await {
+                Err(error) if !error.is_retryable() => {
+                    tracing::warn!(version = %self.question.version, %error, "its cube cannot be read");
+                    None
+                }
+                opened => opened?,
+            }
         } else {
             None
         };
@@ -94,7 +100,14 @@ impl Task {
         let worker = Worker::new(objects, self.question, values).await?;
         let mut all = Accumulated::default();
         for piece in self.pieces {
-            all.merge(worker.reduce(piece).await?)?;
+            match worker.reduce(piece).await {
+                // Chunks that are gone or damaged: the fields say what they held.
+                Err(ComputeError::Cube(error)) if !error.is_retryable() => {
+                    tracing::warn!(%error, "a cube cannot be read");
+                    return Ok(None);
+                }
+                reduced => all.merge(reduced?)?,
+            }
         }
         Ok(Some(all))
     }

@@ -8,7 +8,7 @@ use contract::quantity::Quantity;
 use serde::{Deserialize, Serialize};
 use storage::weights::SharedAreas;
 
-use super::weights::Found;
+use super::found::Found;
 use crate::ComputeError;
 
 /// How far two grids of the same cells may be apart, in cells: axes of files are rounded.

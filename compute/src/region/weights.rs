@@ -7,10 +7,11 @@ use contract::grid::Grid;
 use contract::key::ObjectKey;
 use contract::region::Region;
 use serde::{Deserialize, Serialize};
-use storage::weights::{SharedAreas, Sharing};
+use storage::weights::SharedAreas;
 use storage::{StorageError, Store};
 
 use super::box_cover::{self, Bounds};
+use super::found::Found;
 use super::polygon_cover::Band;
 use super::ring::Ring;
 use super::rings::rings;
@@ -127,10 +128,6 @@ struct Job<'a> {
     surface: Option<&'a Surface>,
 }
 
-/// Most memory that areas of one region may take, bytes, equal chunks counted once: what the coasts of a grid of 1/60 degree need
-/// several times.
-const MAX_AREA_BYTES: u64 = 2 << 30;
-
 /// Areas of a region's share of every cell, m², by chunk number; only chunks with any area.
 pub fn compute(
     grid: &Grid,
@@ -203,31 +200,6 @@ pub(crate) fn shared_of(
 pub(crate) fn covers(grid: &Grid, region: &Region, earth: Earth) -> Result<bool, ComputeError> {
     let shared = shared_of(grid, region, earth, &Surface::All, None)?;
     Ok(!shared.is_empty())
-}
-
-/// Chunks with any area.
-#[derive(Default)]
-pub(super) struct Found {
-    sharing: Sharing,
-    pub(super) chunks: Vec<(u32, SharedAreas)>,
-}
-
-impl Found {
-    /// Adds a chunk, if it has any area.
-    pub(super) fn add(&mut self, chunk: u32, areas_m2: &[f64]) -> Result<(), ComputeError> {
-        if areas_m2.iter().any(|&area_m2| area_m2 > 0.0) {
-            self.chunks.push((chunk, self.sharing.of(areas_m2)));
-        }
-        if self.sharing.distinct_bytes() > MAX_AREA_BYTES {
-            let reason = format!(
-                "its weights on this grid take more than the {} MiB that are held: ask for a smaller region, or one with a simpler \
-                 edge",
-                MAX_AREA_BYTES >> 20
-            );
-            return Err(ComputeError::Region { reason });
-        }
-        Ok(())
-    }
 }
 
 /// Areas inside of rings.

@@ -12,6 +12,7 @@ use contract::quantity::Quantity;
 use cube::{At, Bands, Cube, CubeError, Edit, LevelWindow, Repository, WHOLLY_COVERED, WholeField};
 use cube::{FieldBands, Values, follow, joined_window, verify};
 use futures::future::BoxFuture;
+use object_store::ObjectStoreExt as _;
 use storage::{Store, fields, manifests};
 
 use crate::follow::version;
@@ -190,8 +191,7 @@ async fn directions_become_mean_vectors_and_codes_one_of_themselves() {
     let mask = Quantity::open("sea_mask", "1", "Mask").unwrap();
     let of = |cell: usize| match (cell / 516, cell % 516) {
         (2, 2) => 7.0,
-        (2, 6) => f32::NAN,
-        (0, 4) => f32::NAN,
+        (2, 6) | (0, 4) => f32::NAN,
         (0, 5) => 5.0,
         _ => 1.0,
     };
@@ -309,7 +309,6 @@ async fn a_damaged_chunk_of_a_level_is_told_by_its_array_and_object_and_mended()
         let mut flipped = content.to_vec();
         flipped[content.len() / 2] ^= 4;
         let path = object_store::path::Path::from(key.as_str());
-        use object_store::ObjectStoreExt as _;
         let objects = store.object_store();
         objects.put(&path, flipped.into()).await.unwrap();
         let fresh = store.counted().0;
