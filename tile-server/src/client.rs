@@ -78,7 +78,7 @@ mod tests {
     }
 
     #[test]
-    fn the_last_address_of_a_proxys_header_counts_and_no_address_is_none() {
+    fn the_last_address_that_a_proxy_tells_counts_and_no_address_is_none() {
         let name = HeaderName::from_static("x-forwarded-for");
         let told = |values: &[&str]| {
             let mut headers = HeaderMap::new();
