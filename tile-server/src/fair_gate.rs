@@ -257,6 +257,7 @@ mod tests {
             next.now_or_never().is_some(),
             "the turn of who went is given on"
         );
-        assert_eq!((gate.0.state().running, gate.0.state().waiting), (0, 0));
+        let state = gate.0.state();
+        assert_eq!((state.running, state.waiting), (0, 0));
     }
 }
