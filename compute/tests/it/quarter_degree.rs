@@ -37,8 +37,8 @@ const ACROSS: &str = "29.5,14.5,30.5,15.5";
 const ACROSS_BLOCKS: [[u32; 2]; 2] = [[37, 104], [37, 105]];
 /// Bytes that say where the blocks of a shard lie: 16 for each of 45 x 60, and their checksum.
 const INDEX_BYTES: u64 = 45 * 60 * 16 + 4;
-/// More than the cube's own list of shards has, which is read once.
-const LIST_BYTES: u64 = 1 << 10;
+/// More than the cube's own lists of shards and of parts of levels have, which are read once.
+const LIST_BYTES: u64 = 4 << 10;
 
 /// Days of noise, which does not compress, in some rows and columns and no data anywhere else.
 fn noise(
