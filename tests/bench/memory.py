@@ -68,7 +68,7 @@ def jobs(product):
     yield "all cells: mean, deviation, extremes of every day", [*polygon, "--statistic", "mean,std,min,max", "--step", "native"]
     yield "all cells: p5, median, p95 of every month", [*polygon, "--statistic", "p5,median,p95", "--step", "month"]
     yield "budget by month", ["budget", "--product", product, "--step", "month", *whole]
-    yield "trend of every cell", lambda mib: ["derive", "statistic", "--product", product, "--statistic", "trend", "--name", names[mib == ROOMY_MIB]]
+    yield "mean and deviation of every cell", lambda mib: ["derive", "statistic", "--product", product, "--statistic", "mean,spread", "--name", names[mib == ROOMY_MIB]]
 
 
 def ran(options, folder, mib, words):

@@ -11,7 +11,7 @@ cannot be read rightly is refused. What is stored of it is the digest of its val
 the product then, a tile, a budget, a series, SQL or an export, has the values from there, and compares them with the digest: values that
 changed there since are an error and never a number. Nothing is written to the store that is attached.
 
-  Zarr 2, Zarr 3      a group: a folder, or a part of a bucket (s3://, gs://, az://)
+  Zarr 2, Zarr 3      a group: a folder, a part of a bucket (s3://, gs://, az://), or an address (http://, https://)
   Icechunk            a repository, alike; what is read is the state that its branch main had when it was attached, whatever is
                       committed there later
 
@@ -26,7 +26,7 @@ Examples:
   fluxglobe attach /data/ocean.zarr --variable thetao --index depth=0
   fluxglobe attach --refresh sst-attached")]
 pub(crate) struct Attach {
-    /// Where the store is: a folder, or `s3://BUCKET/PREFIX`, `gs://BUCKET/PREFIX`, `az://CONTAINER/PREFIX`.
+    /// Where the store is: a folder, or `s3://BUCKET/PREFIX`, `gs://BUCKET/PREFIX`, `az://CONTAINER/PREFIX`, `https://HOST/PATH`.
     #[arg(value_name = "URL", required_unless_present = "refresh")]
     pub(crate) url: Option<String>,
     /// Array of the values.
