@@ -18,6 +18,7 @@ mod question;
 mod reduction;
 mod region_sums;
 pub(crate) mod remembered;
+mod remembered_shares;
 mod run;
 mod stored;
 pub(crate) mod task;

@@ -28,7 +28,7 @@ use datafusion::execution::session_state::SessionState;
 use tempfile::TempDir;
 use tokio::net::TcpListener;
 use tokio::sync::{OwnedRwLockReadGuard, RwLock};
-use tokio_stream::wrappers::TcpListenerStream;
+use tonic::transport::server::TcpIncoming;
 
 /// Starts scheduler and executor; the session that hands its queries to them, and the folder they work in.
 ///
@@ -79,7 +79,7 @@ async fn start_executor(
     tokio::spawn(
         create_grpc_server(&GrpcServerConfig::default())
             .add_service(flight)
-            .serve_with_incoming(TcpListenerStream::new(listener)),
+            .serve_with_incoming(TcpIncoming::from(listener).with_nodelay(Some(true))),
     );
     let scheduler = SchedulerGrpcClient::connect(scheduler_url.to_owned()).await?;
     let health = ExecutorHealth::new();

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use futures::future::BoxFuture;
 use icechunk::RepositoryConfig;
 use icechunk::config::{
-    ManifestConfig, ManifestSplitCondition, ManifestSplitDim, ManifestSplitDimCondition,
-    ManifestSplittingConfig,
+    ManifestConfig, ManifestPreloadCondition, ManifestPreloadConfig, ManifestSplitCondition,
+    ManifestSplitDim, ManifestSplitDimCondition, ManifestSplittingConfig,
 };
 use icechunk::format::SnapshotId;
 use icechunk::format::format_constants::SpecVersionBin;
@@ -21,7 +21,7 @@ use crate::{Cube, CubeError, Description, Layout, plain};
 /// The branch that commits go to.
 pub(crate) const BRANCH: &str = "main";
 /// References of chunks in one manifest: what a commit writes again of those that are there, 40 bytes each.
-const MANIFEST_CHUNKS: u32 = 1024;
+const MANIFEST_CHUNKS: u32 = 512;
 
 /// Changes that `repo` tells of, for people; what came before is not kept.
 const LOGGED_UPDATES: u16 = 100;
@@ -129,10 +129,8 @@ impl Repository {
     ) -> Result<icechunk::Repository, CubeError> {
         let storage = ObjectStorage::new(store.clone(), folder);
         let place = storage.to_string();
-        let mut opened = icechunk::Repository::open(Arc::new(storage));
-        if let Some(config) = config {
-            opened = opened.config(config);
-        }
+        let opened = icechunk::Repository::open(Arc::new(storage))
+            .config(read_when_needed(config.unwrap_or_default()));
         opened.execute().await.map_err(|e| match e.kind {
             RepositoryErrorKind::RepositoryDoesntExist => CubeError::Missing { place },
             _ => CubeError::library(&place, "opening the repository", e),
@@ -259,6 +257,22 @@ impl Repository {
 
     pub(crate) fn failed(&self, doing: &'static str, error: &dyn std::fmt::Display) -> CubeError {
         CubeError::library(&self.place, doing, error)
+    }
+}
+
+/// The same for this process, which reads nothing ahead: opening a state has Icechunk read the manifests of all coordinates beside
+/// it, those of every level too, which are known from the description.
+pub(crate) fn read_when_needed(config: RepositoryConfig) -> RepositoryConfig {
+    let preload = ManifestPreloadConfig {
+        preload_if: Some(ManifestPreloadCondition::False),
+        ..ManifestPreloadConfig::default()
+    };
+    RepositoryConfig {
+        manifest: Some(ManifestConfig {
+            preload: Some(preload),
+            ..config.manifest.unwrap_or_default()
+        }),
+        ..config
     }
 }
 

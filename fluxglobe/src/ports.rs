@@ -2,6 +2,7 @@
 
 mod observer;
 
+use std::error::Error;
 use std::num::NonZeroU32;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -23,6 +24,7 @@ use export::answer::AnswerFormat;
 use render_worker::Desk;
 use render_worker::desk::{DeskError, Order, Storing};
 use render_worker::fleet::{Fleet, FleetError};
+use storage::attached::Failure;
 use tile_server::backend::{
     Analyse, BackendError, Class, Draw, Keep, MadeOfSeries, SeriesQuestion, Turn, Version,
 };
@@ -263,7 +265,16 @@ fn fleet_failed(error: &FleetError) -> BackendError {
     }
 }
 
+/// What of a failure is to be told that came from a store of others, where that lasts: it is neither the asker's fault nor ours.
+fn upstream(error: &(dyn Error + 'static)) -> Option<BackendError> {
+    let failure = Failure::behind(error).filter(|failure| !failure.is_retryable)?;
+    Some(BackendError::new(Class::Upstream, failure.to_string()))
+}
+
 fn compute_failed(error: ComputeError) -> BackendError {
+    if let Some(told) = upstream(&error) {
+        return told.because(error);
+    }
     let class = match error.class() {
         ErrorClass::NotFound => Class::NotFound,
         ErrorClass::BadRequest => Class::BadRequest,
@@ -274,6 +285,9 @@ fn compute_failed(error: ComputeError) -> BackendError {
 }
 
 fn desk_failed(error: DeskError) -> BackendError {
+    if let Some(told) = upstream(&error) {
+        return told.because(error);
+    }
     let text = error.to_string();
     let class = match &error {
         DeskError::Full { retry_after, .. } => {
@@ -363,6 +377,42 @@ mod tests {
             ocean,
             ..BudgetQuery::new(product, region.parse().unwrap())
         }
+    }
+
+    #[test]
+    fn what_others_changed_is_told_and_what_we_broke_is_not() {
+        let failure = |is_retryable| Failure {
+            place: "array \"fco2\" of https://data.example/fco2.zarr".to_owned(),
+            reason: "its values are others than were attached".to_owned(),
+            is_retryable,
+        };
+        let stored = |source: Box<dyn Error + Send + Sync>| storage::StorageError::Object {
+            key: "fields/fco2".to_owned(),
+            source: object_store::Error::Generic {
+                store: "attached",
+                source,
+            },
+        };
+        let told = |failed: BackendError| (failed.class, failed.text);
+        let lasting = || stored(failure(false).into());
+        let upstream = (Class::Upstream, failure(false).to_string());
+        assert_eq!(told(compute_failed(lasting().into())), upstream);
+        let cube = cube::CubeError::Storage(lasting());
+        assert_eq!(told(compute_failed(cube.into())), upstream);
+        let drawing = render_worker::DrawError::Store {
+            what: "fields",
+            product: "fco2".to_owned(),
+            source: Box::new(lasting()),
+        };
+        assert_eq!(told(desk_failed(drawing.into())), upstream);
+        // What may pass is asked for again, and what is not theirs is ours.
+        let passing = compute_failed(stored(failure(true).into()).into());
+        assert_eq!(passing.class, Class::Unavailable);
+        let own = storage::StorageError::Damaged {
+            object: "fields/fco2".to_owned(),
+            reason: "a bit".to_owned(),
+        };
+        assert_eq!(compute_failed(own.into()).class, Class::Internal);
     }
 
     #[tokio::test(flavor = "multi_thread")]

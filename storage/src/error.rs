@@ -60,13 +60,7 @@ impl StorageError {
 
     /// Why a field of an attached product could not be read, if that is what failed.
     pub fn attached(&self) -> Option<&Failure> {
-        match self {
-            Self::Object {
-                source: object_store::Error::Generic { source, .. },
-                ..
-            } => source.downcast_ref(),
-            _ => None,
-        }
+        Failure::behind(self)
     }
 
     /// A failure of an event log that may pass.

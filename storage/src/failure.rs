@@ -1,5 +1,7 @@
 //! Why a field of an attached product cannot be read.
 
+use std::error::Error;
+
 /// Why a field of an attached product cannot be read.
 #[derive(Debug, Clone, thiserror::Error)]
 #[error("{place}: {reason}")]
@@ -10,4 +12,18 @@ pub struct Failure {
     pub reason: String,
     /// May the same succeed later?
     pub is_retryable: bool,
+}
+
+impl Failure {
+    /// The failure that an error came from, if it came from one.
+    pub fn behind<'a>(error: &'a (dyn Error + 'static)) -> Option<&'a Self> {
+        let mut next = Some(error);
+        while let Some(error) = next {
+            if let Some(found) = error.downcast_ref() {
+                return Some(found);
+            }
+            next = error.source();
+        }
+        None
+    }
 }

@@ -207,6 +207,8 @@ pub enum Class {
     Busy,
     /// A part that is needed does not answer; the same question may succeed later.
     Unavailable,
+    /// A store of others, to which a product is attached, does not hold what it held; the text says which, and what to do.
+    Upstream,
     /// Our fault; the text goes to the log, not to users.
     Internal,
 }
@@ -258,7 +260,7 @@ impl BackendError {
     pub fn is_retryable(&self) -> bool {
         match self.class {
             Class::Busy | Class::Unavailable => true,
-            Class::BadRequest | Class::NotFound | Class::Internal => false,
+            Class::BadRequest | Class::NotFound | Class::Upstream | Class::Internal => false,
         }
     }
 }

@@ -164,6 +164,7 @@ impl ServerError {
                 Class::BadRequest => StatusCode::BAD_REQUEST,
                 Class::NotFound => StatusCode::NOT_FOUND,
                 Class::Busy | Class::Unavailable => StatusCode::SERVICE_UNAVAILABLE,
+                Class::Upstream => StatusCode::BAD_GATEWAY,
                 Class::Internal => StatusCode::INTERNAL_SERVER_ERROR,
             },
         }

@@ -133,6 +133,9 @@ fn refusals(operation: &Operation) -> Vec<(&'static str, Response)> {
     if takes(&ParameterIn::Path) {
         let text = "Nothing of that name; the reason says where names are listed";
         all.push(("404", refusal(text, false)));
+        let text =
+            "A store of others, to which the product is attached, does not hold what it held";
+        all.push(("502", refusal(text, false)));
     }
     all
 }

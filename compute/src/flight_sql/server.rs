@@ -7,9 +7,9 @@ use std::time::Duration;
 use arrow_flight::flight_service_server::FlightServiceServer;
 use tokio::net::TcpListener;
 use tokio::sync::Semaphore;
-use tokio_stream::wrappers::TcpListenerStream;
 use tonic::service::interceptor::InterceptedService;
 use tonic::transport::Server;
+use tonic::transport::server::TcpIncoming;
 
 use super::access::Access;
 use super::limits::FlightSqlLimits;
@@ -68,7 +68,10 @@ impl FlightSqlServer {
             .http2_keepalive_interval(Some(SILENCE))
             .http2_keepalive_timeout(Some(SILENCE))
             .add_service(InterceptedService::new(flight, self.access))
-            .serve_with_incoming_shutdown(TcpListenerStream::new(self.listener), stop);
+            .serve_with_incoming_shutdown(
+                TcpIncoming::from(self.listener).with_nodelay(Some(true)),
+                stop,
+            );
         let failed =
             |error| ComputeError::machine("serving Flight SQL")(std::io::Error::other(error));
         served.await.map_err(failed)

@@ -129,22 +129,33 @@ impl Summing {
             let row = &mut self.rows[if is_block { cell / ROWS } else { 0 }];
             let is_alone =
                 row.cell_count > 0 && row.weight != *weight && cells.get(cell + 1) != Some(weight);
+            if is_alone && !self.with_squares {
+                if self.totals.add_cell(first, own, self.steps_of, *weight) {
+                    return Err(self.beyond(own));
+                }
+                continue;
+            }
             let to = if is_alone { &mut self.alone } else { row };
             if to.weight != *weight || to.cell_count == MOST_CELLS {
                 to.flush(first, &mut self.totals);
                 to.weight = *weight;
             }
             if to.add(own, self.steps_of) {
-                let beyond = own
-                    .iter()
-                    .find(|it| !it.is_nan() && !self.scale.holds(**it));
-                return Err(OutOfRange(beyond.copied().unwrap_or(f32::NAN).into()));
+                return Err(self.beyond(own));
             }
             if is_alone {
                 to.flush(first, &mut self.totals);
             }
         }
         Ok(())
+    }
+
+    /// The value that cannot be summed.
+    fn beyond(&self, values: &[f32]) -> OutOfRange {
+        let beyond = values
+            .iter()
+            .find(|it| !it.is_nan() && !self.scale.holds(**it));
+        OutOfRange(beyond.copied().unwrap_or(f32::NAN).into())
     }
 
     fn flush(&mut self) {

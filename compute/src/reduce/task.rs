@@ -14,6 +14,7 @@ use super::accumulator::Accumulated;
 use super::cells::{self, Cells, block, block_window};
 use super::question::{Layout, Piece, Question, Wanted};
 use super::reduction::{CellShares, Reduction};
+use super::remembered_shares::RememberedShares;
 use super::stored::{Stored as StoredSums, Terms};
 use super::values::Values;
 use crate::ComputeError;
@@ -40,6 +41,11 @@ impl Task {
     /// It is none.
     pub(crate) fn of_text(text: &str) -> Result<Self, ComputeError> {
         serde_json::from_str(text).map_err(|e| ComputeError::inconsistent("a task", e))
+    }
+
+    /// About how much is read for it, bytes before compression.
+    pub(crate) fn cost_bytes(&self) -> u64 {
+        self.pieces.iter().map(Piece::cost_bytes).sum()
     }
 
     /// Its pieces as at most `count` tasks, none of them idle, each with about as much to read as the others.
@@ -125,6 +131,7 @@ pub(super) struct Worker {
     question: Arc<Question>,
     whole: Arc<RegionWeights>,
     covered: Arc<RegionWeights>,
+    shares: Arc<RememberedShares>,
     /// The version along time, where it was opened.
     values: Option<cube::Values>,
 }
@@ -142,6 +149,7 @@ impl Worker {
         Ok(Self {
             whole: weights(&question.whole).await?,
             covered: weights(&question.covered).await?,
+            shares: Arc::default(),
             objects: objects.clone(),
             question: Arc::new(question),
             values,
@@ -296,16 +304,18 @@ impl Worker {
     ) -> Result<Result<Accumulated, ComputeError>, Undecoded> {
         let shape = self.question.shape;
         let mut reduction = Reduction::of(&self.question, piece, self.seconds(piece));
+        let made = |number: u32| self.cells_of(block_window(shape, number), true);
+        let shares = self.shares.of(&piece.rows, made);
         let mut failed = None;
         blocks.each(|number, values| {
-            let cells = self.cells_of(block_window(shape, piece.rows[number]), true);
+            let cells = &shares[number];
             let added = blocks.pieces().iter().try_for_each(|run| {
                 let run_values = Values {
                     of: values,
                     step_count: RUN_STEPS,
                     first: run.in_run,
                 };
-                reduction.add(run_values, &cells, run.asked..run.asked + run.count)
+                reduction.add(run_values, cells, run.asked..run.asked + run.count)
             });
             failed = added.err();
             failed.is_none()

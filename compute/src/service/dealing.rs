@@ -16,6 +16,10 @@ use crate::reduce::task::Task;
 
 /// Tasks for each place of an executor: who is done early takes one more, and a lost executor loses less.
 const TASKS_A_PLACE: usize = 2;
+/// The same where tasks are long: none of them is waited for at the end while other executors have nothing to do.
+const MOST_TASKS_A_PLACE: usize = 6;
+/// What a task of those reads, bytes before compression: some tenth of a second, where to hand out a task takes 5 ms.
+const TASK_BYTES: u64 = 128 << 20;
 /// Tasks however few executors there are: more of them may come while a query waits.
 const LEAST_TASKS: usize = 8;
 
@@ -26,12 +30,11 @@ pub(super) struct Dealing;
 impl AnalyzerRule for Dealing {
     fn analyze(&self, plan: LogicalPlan, config: &ConfigOptions) -> Result<LogicalPlan> {
         let places = config.execution.target_partitions;
-        let count = (places * TASKS_A_PLACE).max(LEAST_TASKS);
         let cut = |node: LogicalPlan| {
             let LogicalPlan::Aggregate(aggregate) = &node else {
                 return Ok(Transformed::no(node));
             };
-            match dealt(&aggregate.input, count)? {
+            match dealt(&aggregate.input, places)? {
                 None => Ok(Transformed::no(node)),
                 Some(input) => {
                     let expressions = node.expressions();
@@ -48,12 +51,19 @@ impl AnalyzerRule for Dealing {
     }
 }
 
+/// How many tasks a question is cut into that reads so much.
+fn task_count(cost_bytes: u64, places: usize) -> usize {
+    let by_size = (cost_bytes / TASK_BYTES) as usize;
+    let by_places = by_size.clamp(places * TASKS_A_PLACE, places * MOST_TASKS_A_PLACE);
+    by_places.max(LEAST_TASKS)
+}
+
 /// What the tasks of a question accumulate; none of another plan, or of a question that is one task.
-fn dealt(plan: &LogicalPlan, count: usize) -> Result<Option<LogicalPlan>> {
+fn dealt(plan: &LogicalPlan, places: usize) -> Result<Option<LogicalPlan>> {
     match plan {
         LogicalPlan::SubqueryAlias(named) => {
             let name = |input| SubqueryAlias::try_new(Arc::new(input), named.alias.clone());
-            let dealt = dealt(&named.input, count)?.map(name).transpose()?;
+            let dealt = dealt(&named.input, places)?.map(name).transpose()?;
             Ok(dealt.map(LogicalPlan::SubqueryAlias))
         }
         LogicalPlan::Projection(of_all) => {
@@ -61,7 +71,9 @@ fn dealt(plan: &LogicalPlan, count: usize) -> Result<Option<LogicalPlan>> {
                 return Ok(None);
             };
             let external = |e: crate::ComputeError| DataFusionError::External(e.into());
-            let tasks = Task::of_text(text).map_err(external)?.dealt(count);
+            let task = Task::of_text(text).map_err(external)?;
+            let count = task_count(task.cost_bytes(), places);
+            let tasks = task.dealt(count);
             if tasks.len() < 2 {
                 return Ok(None);
             }
@@ -111,4 +123,17 @@ fn part(of_all: &Projection, text: &str) -> Result<Arc<LogicalPlan>> {
     });
     let part = Projection::try_new(named.collect(), Arc::clone(&of_all.input))?;
     Ok(Arc::new(LogicalPlan::Projection(part)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tasks_follow_the_places_and_long_ones_are_cut_finer() {
+        assert_eq!(task_count(1, 1), LEAST_TASKS);
+        assert_eq!(task_count(1, 16), 32);
+        assert_eq!(task_count(40 * TASK_BYTES, 16), 40);
+        assert_eq!(task_count(1 << 40, 16), 96);
+    }
 }

@@ -38,8 +38,8 @@ use storage::Store;
 use tokio::net::TcpListener;
 use tokio::sync::{Notify, Semaphore};
 use tokio::time::Instant;
-use tokio_stream::wrappers::TcpListenerStream;
 use tonic::transport::Channel;
+use tonic::transport::server::TcpIncoming;
 
 use super::background::Background;
 use super::executor_metrics::CountedEngine;
@@ -55,9 +55,11 @@ const TIDY_INTERVAL: Duration = Duration::from_secs(10);
 /// Intermediate results that nobody wrote to for so long belong to queries that nobody remembers.
 const FORGOTTEN: Duration = Duration::from_hours(2);
 /// How often an executor without a task asks for one.
-const IDLE_ASK: Duration = Duration::from_millis(50);
+const IDLE_ASK: Duration = Duration::from_millis(25);
 /// And one that works on some: it reports those that ended with its questions.
 const BUSY_ASK: Duration = Duration::from_millis(10);
+/// For so long after its last task: the next stage of a query follows, or its next pass.
+const STILL_BUSY: Duration = Duration::from_millis(500);
 /// A scheduler that was not seen for so long is away.
 const AWAY: Duration = Duration::from_secs(5);
 /// How long the report on the last task may take: an executor without a free hand makes a request every five seconds.
@@ -254,6 +256,11 @@ fn codec() -> BallistaCodec {
     BallistaCodec::default()
 }
 
+/// Connections that send each answer at once: a stage over tasks of several executors waits 40 ms for each small one else.
+fn at_once(listener: TcpListener) -> TcpIncoming {
+    TcpIncoming::from(listener).with_nodelay(Some(true))
+}
+
 /// Serves intermediate results to other executors and to clients.
 async fn serve(listener: TcpListener, work: Arc<WorkFolder>) -> Result<(), BallistaError> {
     let folder = work.path().display().to_string();
@@ -262,7 +269,7 @@ async fn serve(listener: TcpListener, work: Arc<WorkFolder>) -> Result<(), Balli
         .max_encoding_message_size(state::MESSAGE_BYTES);
     create_grpc_server(&GrpcServerConfig::default())
         .add_service(flight)
-        .serve_with_incoming(TcpListenerStream::new(listener))
+        .serve_with_incoming(at_once(listener))
         .await
         .map_err(BallistaError::from)
 }
@@ -278,8 +285,12 @@ fn ended_early(
 /// Has the scheduler asked for work again and again: more often while tasks run, since a task's end is reported with the
 /// next question, and the next stage of a query begins no earlier.
 async fn keep_asking(hands: Arc<Semaphore>, tasks: usize, nudge: Arc<Notify>) {
+    let mut busy_until = Instant::now();
     loop {
-        let is_idle = hands.available_permits() == tasks;
+        if hands.available_permits() < tasks {
+            busy_until = Instant::now() + STILL_BUSY;
+        }
+        let is_idle = Instant::now() >= busy_until;
         tokio::time::sleep(if is_idle { IDLE_ASK } else { BUSY_ASK }).await;
         nudge.notify_one();
     }

@@ -18,7 +18,7 @@ use ballista_scheduler::scheduler_server::SchedulerServer;
 use futures::future::BoxFuture;
 use prometheus::{IntGauge, Registry};
 use storage::Store;
-use tokio::net::TcpListener;
+use tokio::net::{TcpListener, TcpSocket};
 use tokio::time::Instant;
 
 use super::background::Background;
@@ -32,6 +32,8 @@ use crate::{ComputeError, Objects, state};
 const LOOK_SECONDS: u64 = 1;
 /// How long queries without any executor are kept waiting for one.
 const NO_EXECUTOR_SECONDS: u64 = 600;
+/// Connections that wait to be taken.
+const WAITING_CONNECTIONS: u32 = 1024;
 /// How often a drain looks whether queries still run.
 const DRAIN_LOOK: Duration = Duration::from_millis(100);
 /// An object that is never there: asking for it shows whether the store answers.
@@ -84,7 +86,7 @@ impl Scheduler {
     ) -> BoxFuture<'a, Result<Self, ComputeError>> {
         Box::pin(async move {
             let listen = settings.scheduler_listen;
-            let listener = TcpListener::bind(listen).await.map_err(ComputeError::machine(
+            let listener = bound(listen).map_err(ComputeError::machine(
             format!("cannot listen on {listen}; is another scheduler there? Give another --scheduler-listen"),
         ))?;
             let address = listener
@@ -170,6 +172,20 @@ impl Scheduler {
             }
         })
     }
+}
+
+/// Listens; connections send each answer at once, which they have from this socket: an executor asks a hundred times a second.
+fn bound(address: SocketAddr) -> std::io::Result<TcpListener> {
+    let socket = if address.is_ipv4() {
+        TcpSocket::new_v4()?
+    } else {
+        TcpSocket::new_v6()?
+    };
+    // As tokio's and the standard library's listeners do: a port that was in use a moment ago is free.
+    socket.set_reuseaddr(true)?;
+    socket.set_nodelay(true)?;
+    socket.bind(address)?;
+    socket.listen(WAITING_CONNECTIONS)
 }
 
 fn watched(ended: Result<(), tokio::task::JoinError>) -> Result<(), ComputeError> {

@@ -5,6 +5,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use bytes::Bytes;
+use icechunk::RepositoryConfig;
 use icechunk::format::SnapshotId;
 use icechunk::repository::VersionInfo;
 use serde_json::{Map, Value};
@@ -23,6 +24,7 @@ use super::error::ForeignError;
 use super::objects::Objects;
 use super::read_only::ReadOnly;
 use crate::error::first_lines;
+use crate::repository::read_when_needed;
 
 /// The branch of a repository whose newest state is read.
 const BRANCH: &str = "main";
@@ -335,7 +337,8 @@ async fn repository(
     let refused = |doing: &str, e: &dyn std::fmt::Display| {
         ForeignError::refused(&place, format!("{doing}: {}", first_lines(e)))
     };
-    let opened = icechunk::Repository::open(Arc::new(ReadOnly(objects)));
+    let opened = icechunk::Repository::open(Arc::new(ReadOnly(objects)))
+        .config(read_when_needed(RepositoryConfig::default()));
     let opened = opened.execute().await;
     let opened = opened.map_err(|e| refused("opening the Icechunk repository", &e))?;
     let snapshot: SnapshotId = match &found.snapshot {

@@ -110,3 +110,13 @@ async fn an_analyst_that_answers_too_little_is_our_fault_and_tells_no_details() 
     assert_eq!(answer.status, StatusCode::INTERNAL_SERVER_ERROR);
     assert!(!answer.text().contains("secret"), "{}", answer.text());
 }
+
+#[tokio::test]
+async fn a_store_of_others_that_changed_is_told_by_its_name() {
+    let app = TestApp::new().await;
+    let told = "https://data.example/fco2.zarr, array \"fco2\", chunk [3, 0, 0]: its values are others than were attached";
+    app.analyst.set(Mood::fails(Class::Upstream, told));
+    let answer = app.get("/api/products/sst/point?lon=0&lat=0").await;
+    assert_eq!(answer.status, StatusCode::BAD_GATEWAY);
+    assert_eq!(answer.reason(), told);
+}

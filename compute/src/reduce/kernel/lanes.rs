@@ -119,47 +119,141 @@ fn add_any(values: &[f32], steps: Steps, to: &mut ByStep<'_>) -> bool {
 pub(super) struct Weighed<'a> {
     pub(super) counts: &'a mut [i64],
     pub(super) weights: &'a mut [i64],
-    pub(super) covered: &'a mut [i64],
+    /// What coverage counts besides the weight.
+    pub(super) extra: &'a mut [i64],
 }
 
-/// Adds how many values there are times what each of them weighs, and what coverage counts of it.
-pub(super) fn add_counts(counts: &[i64], [weight, covered]: [i64; 2], to: &mut Weighed<'_>) {
+/// What a cell weighs, and what coverage counts besides that.
+pub(super) type WeightExtra = [i64; 2];
+
+/// Adds how many values there are times what each of them weighs, and what coverage counts besides.
+pub(super) fn add_counts(counts: &[i64], own: WeightExtra, to: &mut Weighed<'_>) {
     #[cfg(target_arch = "x86_64")]
     #[expect(unsafe_code, reason = "the processor has what it is compiled for")]
     match Lanes::of_this_processor() {
         // SAFETY: the processor was asked.
-        Lanes::Eight => return unsafe { add_counts_avx512(counts, [weight, covered], to) },
+        Lanes::Eight => return unsafe { add_counts_avx512(counts, own, to) },
         // SAFETY: as above.
-        Lanes::Four => return unsafe { add_counts_avx2(counts, [weight, covered], to) },
+        Lanes::Four => return unsafe { add_counts_avx2(counts, own, to) },
         Lanes::Any => {}
     }
-    add_counts_any(counts, [weight, covered], to);
+    add_counts_any(counts, own, to);
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512dq,avx512vl")]
-fn add_counts_avx512(counts: &[i64], weights: [i64; 2], to: &mut Weighed<'_>) {
-    add_counts_any(counts, weights, to);
+fn add_counts_avx512(counts: &[i64], own: WeightExtra, to: &mut Weighed<'_>) {
+    add_counts_any(counts, own, to);
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
-fn add_counts_avx2(counts: &[i64], weights: [i64; 2], to: &mut Weighed<'_>) {
-    add_counts_any(counts, weights, to);
+fn add_counts_avx2(counts: &[i64], own: WeightExtra, to: &mut Weighed<'_>) {
+    add_counts_any(counts, own, to);
 }
 
 #[expect(clippy::inline_always, reason = "it is compiled several times")]
 #[inline(always)]
-fn add_counts_any(counts: &[i64], [weight, covered]: [i64; 2], to: &mut Weighed<'_>) {
+fn add_counts_any(counts: &[i64], [weight, extra]: WeightExtra, to: &mut Weighed<'_>) {
     for (own, count) in to.counts.iter_mut().zip(counts) {
         *own += count;
     }
     for (own, count) in to.weights.iter_mut().zip(counts) {
         *own += count * weight;
     }
-    for (own, count) in to.covered.iter_mut().zip(counts) {
-        *own += count * covered;
+    if extra != 0 {
+        for (own, count) in to.extra.iter_mut().zip(counts) {
+            *own += count * extra;
+        }
     }
+}
+
+/// Bits of a value's steps that are multiplied apart from the others.
+pub(super) const LOW_BITS: u32 = 22;
+/// Products that fit into 64 bits together: a value is below 2⁴⁵ steps, a weight below 2³⁸.
+pub(super) const MOST_PRODUCTS: usize = 4;
+
+/// Sums of products by step, all of one length: their low parts, and their high ones in units of 2²².
+pub(super) struct Products<'a> {
+    pub(super) low: &'a mut [i64],
+    pub(super) high: &'a mut [i64],
+}
+
+/// Adds the values of one cell times its weight; is one among them that cannot be summed? Then the sums say nothing.
+pub(super) fn add_products(
+    values: &[f32],
+    steps: Steps,
+    own: WeightExtra,
+    to: (&mut Weighed<'_>, &mut Products<'_>),
+) -> bool {
+    #[cfg(target_arch = "x86_64")]
+    #[expect(unsafe_code, reason = "the processor has what it is compiled for")]
+    match Lanes::of_this_processor() {
+        // SAFETY: the processor was asked.
+        Lanes::Eight => return unsafe { add_products_avx512(values, steps, own, to) },
+        // SAFETY: as above.
+        Lanes::Four => return unsafe { add_products_avx2(values, steps, own, to) },
+        Lanes::Any => {}
+    }
+    add_products_any(values, steps, own, to)
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f,avx512dq,avx512vl")]
+fn add_products_avx512(
+    values: &[f32],
+    steps: Steps,
+    own: WeightExtra,
+    to: (&mut Weighed<'_>, &mut Products<'_>),
+) -> bool {
+    add_products_any(values, steps, own, to)
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn add_products_avx2(
+    values: &[f32],
+    steps: Steps,
+    own: WeightExtra,
+    to: (&mut Weighed<'_>, &mut Products<'_>),
+) -> bool {
+    add_products_any(values, steps, own, to)
+}
+
+#[expect(clippy::inline_always, reason = "it is compiled several times")]
+#[inline(always)]
+fn add_products_any(
+    values: &[f32],
+    steps: Steps,
+    [weight, extra]: WeightExtra,
+    (weighed, products): (&mut Weighed<'_>, &mut Products<'_>),
+) -> bool {
+    let mut beyond = 0;
+    let sums = products.low.iter_mut().zip(&mut *products.high);
+    for ((low, high), value) in sums.zip(values) {
+        let distance = steps.distance(*value);
+        // Of what is beyond anything physical this is some number.
+        let own = if value.is_nan() { 0 } else { nearest(distance) };
+        *low = low.wrapping_add((own & ((1 << LOW_BITS) - 1)).wrapping_mul(weight));
+        *high = high.wrapping_add((own >> LOW_BITS).wrapping_mul(weight));
+        beyond |= i64::from(distance.abs() > steps.most);
+    }
+    for ((count, sum), value) in weighed
+        .counts
+        .iter_mut()
+        .zip(&mut *weighed.weights)
+        .zip(values)
+    {
+        let is_there = !value.is_nan();
+        *count += i64::from(is_there);
+        *sum += if is_there { weight } else { 0 };
+    }
+    if extra != 0 {
+        for (sum, value) in weighed.extra.iter_mut().zip(values) {
+            *sum += if value.is_nan() { 0 } else { extra };
+        }
+    }
+    beyond != 0
 }
 
 #[cfg(test)]
@@ -180,6 +274,40 @@ mod tests {
             all.push(&|values, steps, to| unsafe { add_avx2(values, steps, to) });
         }
         all
+    }
+
+    /// The heaviest cell that there is, and less of it for coverage.
+    const OWN: WeightExtra = [(1 << 38) - 1, -(1 << 37)];
+
+    /// Each compilation's products of the same values, as often as they fit: what was beyond, counts, weights, extra, low and high.
+    fn products_of(values: &[f32], steps: Steps) -> Vec<(bool, [Vec<i64>; 5])> {
+        type Add = dyn Fn(&[f32], Steps, (&mut Weighed<'_>, &mut Products<'_>)) -> bool;
+        let mut all: Vec<&Add> = vec![
+            &|values, steps, to| add_products(values, steps, OWN, to),
+            &|values, steps, to| add_products_any(values, steps, OWN, to),
+        ];
+        #[cfg(target_arch = "x86_64")]
+        if is_x86_feature_detected!("avx2") {
+            #[expect(unsafe_code, reason = "the processor was asked")]
+            // SAFETY: the line before.
+            all.push(&|values, steps, to| unsafe { add_products_avx2(values, steps, OWN, to) });
+        }
+        let of = |add: &&Add| {
+            let mut sums: [Vec<i64>; 5] = std::array::from_fn(|_| vec![0; values.len()]);
+            let mut is_beyond = false;
+            for _ in 0..MOST_PRODUCTS {
+                let [counts, weights, extra, low, high] = &mut sums;
+                let mut weighed = Weighed {
+                    counts,
+                    weights,
+                    extra,
+                };
+                let mut products = Products { low, high };
+                is_beyond |= add(values, steps, (&mut weighed, &mut products));
+            }
+            (is_beyond, sums)
+        };
+        all.iter().map(of).collect()
     }
 
     #[test]
@@ -220,6 +348,20 @@ mod tests {
                     let own = found.1.each_ref().map(|own| own[at]);
                     assert_eq!(own, [3 + i64::from(is_there), steps - 5, square + 9]);
                 }
+                let products = products_of(&values, Steps::of(scale));
+                for (compiled, lanes) in products.iter().enumerate() {
+                    assert_eq!(lanes, &products[0], "compilation {compiled}");
+                }
+                for (at, value) in values.iter().enumerate() {
+                    let is_there = i64::from(!value.is_nan());
+                    let steps = is_there * if is_there > 0 { scale.steps(*value) } else { 0 };
+                    let [counts, weights, extra, low, high] = &products[0].1;
+                    let sum = i128::from(low[at]) + (i128::from(high[at]) << LOW_BITS);
+                    assert_eq!(sum, 4 * i128::from(steps) * i128::from(OWN[0]));
+                    let found = [counts[at], weights[at], extra[at]];
+                    let once = [1, OWN[0], OWN[1]];
+                    assert_eq!(found, once.map(|one| 4 * is_there * one));
+                }
                 for bad in [
                     f32::INFINITY,
                     f32::NEG_INFINITY,
@@ -229,6 +371,9 @@ mod tests {
                         *last = bad;
                         for compiled in compilations() {
                             assert!(of(compiled, &values).0, "{bad}");
+                        }
+                        for (is_beyond, _) in products_of(&values, Steps::of(scale)) {
+                            assert!(is_beyond, "{bad}");
                         }
                     }
                 }

@@ -1,6 +1,8 @@
 //! Sums of steps while cells are added to them.
 
-use super::lanes::{Weighed, add_counts};
+use super::lanes::{
+    LOW_BITS, MOST_PRODUCTS, Products, Steps, Weighed, WeightExtra, add_counts, add_products,
+};
 use crate::reduce::accumulator::StepSums;
 use crate::reduce::cells::CellWeight;
 
@@ -10,12 +12,17 @@ const MOST_CELLS: usize = 1 << 24;
 /// Sums by step, each kind side by side.
 #[derive(Debug, Default)]
 pub(super) struct Totals {
-    /// Cells that were added to `counts`, `weights` and `covered`.
+    /// Cells that were added to `counts`, `weights` and `extra`.
     cell_count: usize,
     counts: Vec<i64>,
     weights: Vec<i64>,
-    covered: Vec<i64>,
+    /// What coverage counts besides weights.
+    extra: Vec<i64>,
     sums: Vec<i128>,
+    /// Cells that were added to `low` and `high`, products in two parts that are not yet in `sums`.
+    product_count: usize,
+    low: Vec<i64>,
+    high: Vec<i64>,
     squares: Vec<i128>,
     /// Nothing where they are not wanted.
     extremes: Vec<[f32; 2]>,
@@ -32,8 +39,11 @@ impl Totals {
             cell_count: 0,
             counts: vec![0; steps],
             weights: vec![0; steps],
-            covered: vec![0; steps],
+            extra: vec![0; steps],
             sums: vec![0; steps],
+            product_count: 0,
+            low: vec![0; steps],
+            high: vec![0; steps],
             squares: vec![0; steps],
             extremes: vec![[none.min, none.max]; extremes],
             before: vec![none; steps],
@@ -53,20 +63,59 @@ impl Totals {
         }
         self.cell_count += cell_count;
         let steps = first..first + counts.len();
-        let CellWeight { weight, covered } = weight;
         let mut to = Weighed {
             counts: &mut self.counts[steps.clone()],
             weights: &mut self.weights[steps.clone()],
-            covered: &mut self.covered[steps.clone()],
+            extra: &mut self.extra[steps.clone()],
         };
-        add_counts(counts, [weight, covered], &mut to);
-        let weighed = |sum: i64| i128::from(sum) * i128::from(weight);
+        add_counts(counts, in_parts(weight), &mut to);
+        let weighed = |sum: i64| i128::from(sum) * i128::from(weight.weight);
         for (own, sum) in self.sums[steps.clone()].iter_mut().zip(sums) {
             *own += weighed(*sum);
         }
         for (own, square) in self.squares[steps].iter_mut().zip(squares) {
             *own += weighed(*square);
         }
+    }
+
+    /// Adds a cell's values at steps from `first` on; is one among them that cannot be summed?
+    pub(super) fn add_cell(
+        &mut self,
+        first: usize,
+        values: &[f32],
+        steps_of: Steps,
+        weight: CellWeight,
+    ) -> bool {
+        if self.cell_count + 1 > MOST_CELLS {
+            self.put_by();
+        }
+        if self.product_count == MOST_PRODUCTS {
+            self.carry();
+        }
+        self.cell_count += 1;
+        self.product_count += 1;
+        let steps = first..first + values.len();
+        let mut weighed = Weighed {
+            counts: &mut self.counts[steps.clone()],
+            weights: &mut self.weights[steps.clone()],
+            extra: &mut self.extra[steps.clone()],
+        };
+        let mut products = Products {
+            low: &mut self.low[steps.clone()],
+            high: &mut self.high[steps],
+        };
+        let to = (&mut weighed, &mut products);
+        add_products(values, steps_of, in_parts(weight), to)
+    }
+
+    /// Adds both parts of products to the sums.
+    fn carry(&mut self) {
+        let parts = self.low.iter_mut().zip(&mut self.high);
+        for (sum, (low, high)) in self.sums.iter_mut().zip(parts) {
+            *sum += i128::from(*low) + (i128::from(*high) << LOW_BITS);
+            (*low, *high) = (0, 0);
+        }
+        self.product_count = 0;
     }
 
     /// Takes the extremes of a cell, if they are wanted.
@@ -80,15 +129,16 @@ impl Totals {
 
     /// Makes room for more cells.
     fn put_by(&mut self) {
+        self.carry();
         self.cell_count = 0;
         for (step, before) in self.before.iter_mut().enumerate() {
             before.count += self.counts[step].unsigned_abs();
             before.weight += i128::from(self.weights[step]);
-            before.covered += i128::from(self.covered[step]);
+            before.covered += i128::from(self.weights[step]) + i128::from(self.extra[step]);
             before.sum += self.sums[step];
             before.squares += self.squares[step];
         }
-        for sums in [&mut self.counts, &mut self.weights, &mut self.covered] {
+        for sums in [&mut self.counts, &mut self.weights, &mut self.extra] {
             sums.fill(0);
         }
         self.sums.fill(0);
@@ -103,6 +153,11 @@ impl Totals {
         }
         self.before
     }
+}
+
+/// What coverage counts of a cell is told by how much it differs from the weight: mostly by nothing.
+fn in_parts(CellWeight { weight, covered }: CellWeight) -> WeightExtra {
+    [weight, covered - weight]
 }
 
 #[cfg(test)]
