@@ -16,7 +16,7 @@ use tower_http::cors::{Any, CorsLayer};
 
 use crate::client;
 use crate::error::ServerError;
-use crate::middleware::{body, panics::CountPanics, security, track};
+use crate::middleware::{body, panics::CountPanics, security, tag, track};
 use crate::routes::picture::{COVERED, HEIGHTS_END, HEIGHTS_WITHIN, SHOWN_TIME, TILT_WITH_GROUND};
 use crate::routes::{
     analysis, area, budget, check, correlation, difference, events, globe, health, hovmoller,
@@ -64,7 +64,8 @@ pub fn router(state: AppState) -> Router {
         .layer(from_fn_with_state(
             state.settings.client_header.clone(),
             client::remember,
-        ));
+        ))
+        .layer(from_fn(tag::tagged));
     Router::new()
         .route("/tiles/{product}/{mode_json}", get(tilejson::get))
         .route("/tiles/{product}/{mode}/{z}/{x}/{y_png}", get(tiles::get))

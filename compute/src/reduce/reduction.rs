@@ -22,6 +22,8 @@ pub(super) struct Reduction<'a> {
     question: &'a Question,
     piece: &'a Piece,
     targets: Vec<Target>,
+    /// Those of the steps that were added to last, counted from the first of these: mostly the same for all blocks.
+    own_targets: (Range<usize>, Vec<Target>),
     sums: Option<Summing>,
     regions: Vec<RegionStepSums>,
     /// Of each step what its values are multiplied with besides the area; nothing where no sums over a region are wanted.
@@ -49,6 +51,7 @@ impl<'a> Reduction<'a> {
             question,
             piece,
             targets: piece.targets(&question.wanted),
+            own_targets: (0..0, vec![]),
             sums,
             regions: vec![RegionStepSums::default(); if is_of_region { steps } else { 0 }],
             all: Accumulated::default(),
@@ -69,13 +72,16 @@ impl<'a> Reduction<'a> {
                 None => Ok(()),
             },
             (Wanted::Histograms { ranges, .. }, CellShares::Weights(cells)) => {
-                let own = self.targets.iter().filter(|it| steps.contains(&it.step));
-                let own = own.map(|it| Target {
-                    step: it.step - steps.start,
-                    ranges: it.ranges.clone(),
-                });
-                let own: Vec<Target> = own.collect();
-                let added = add_weights(values, cells, &own, ranges, &mut self.all.histograms);
+                if self.own_targets.0 != steps {
+                    let own = self.targets.iter().filter(|it| steps.contains(&it.step));
+                    let own = own.map(|it| Target {
+                        step: it.step - steps.start,
+                        ranges: it.ranges.clone(),
+                    });
+                    self.own_targets = (steps, own.collect());
+                }
+                let own = &self.own_targets.1;
+                let added = add_weights(values, cells, own, ranges, &mut self.all.histograms);
                 added.ok_or_else(too_large)
             }
             (Wanted::RegionSums { .. }, CellShares::Areas(cells)) => {

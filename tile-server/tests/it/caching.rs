@@ -614,3 +614,31 @@ async fn the_list_of_products_names_addresses_that_may_be_kept_for_ever() {
     }
     assert!(count >= 3 * (4 + 1 + 4 + 5 + 4), "{count}");
 }
+
+#[tokio::test]
+async fn who_has_an_answer_already_is_not_sent_it_again() {
+    let app = TestApp::new().await;
+    let point = "/api/products/sst/point?lon=0&lat=0";
+    for address in [
+        point,
+        "/api/regions",
+        "/api/products/flux/budget?region=global",
+    ] {
+        let first = app.get(address).await;
+        assert_eq!(first.status, StatusCode::OK, "{address}: {}", first.text());
+        let tag = first.header("etag").to_owned();
+        let known = app.get_with(address, &[("if-none-match", &tag)]).await;
+        assert_eq!(known.status, StatusCode::NOT_MODIFIED, "{address}");
+        assert!(known.body.is_empty());
+        assert_eq!(known.header("etag"), tag);
+        let other = app
+            .get_with(address, &[("if-none-match", "W/\"other\"")])
+            .await;
+        assert_eq!((other.status, &other.body), (StatusCode::OK, &first.body));
+    }
+    // Another form is another answer, and a refusal has no tag.
+    let csv = app.get(&format!("{point}&format=csv")).await;
+    assert_ne!(csv.header("etag"), app.get(point).await.header("etag"));
+    let refused = app.get("/api/products/sst/point?lon=0&lat=75").await;
+    assert!(!refused.headers.contains_key("etag"));
+}
