@@ -1,0 +1,311 @@
+"""Statistics of every cell in a polygon over many years: `fluxglobe derive statistic` beside xarray with flox, and pymannkendall.
+
+Of some 46,000 cells of the made-up China Sea (`fluxglobe generate china-sea --years N`, 450 x 615 cells a day): the monthly
+climatology, the anomaly of every day, and the trend of every cell with its significance: Theil and Sen's slope through means of
+months, seasons taken off, with Mann and Kendall's test (variance after Hamed and Rao 1998), and least squares with an effective
+number of values (Santer et al. 2000). Both sides read what they have landed, files in the page cache, and store what they find:
+ours as products (fields, a cube in both layouts, levels), the peer as Zarr in its layout by time, which is its quickest for all of
+this. Its least squares are worked out over all cells at once by NumPy; Mann and Kendall's test is pymannkendall's, cell by cell on
+all processors, of some cells, and the time of all is reckoned from theirs. All are compared before any figure is told.
+
+    make bench ARGS="maps --data FOLDER"      # the folder of `stats --data` may be used again
+    make bench ARGS="maps --years 6"
+"""
+
+import argparse
+import json
+import os
+import shutil
+import sys
+import tempfile
+import time
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+
+import stats
+import tiles
+
+NAME = "bench-maps"
+# What is asked for, a command each; the last is all that one would ask for at once.
+CLIMATOLOGY, ANOMALY = ["climatology"], ["anomaly"]
+TREND = ["trend", "trend-p-value"]
+LEAST_SQUARES = ["least-squares-trend", "least-squares-trend-p-value"]
+ALL = [*CLIMATOLOGY, *ANOMALY, *TREND]
+# Cells that the peer tests.
+TREND_CELLS = 1000
+# How far apart answers may be, as a share of the largest: the peer sums in 32 bits.
+TOLERANCE = 2e-5
+# Steps of which anomalies are compared.
+STEPS = 40
+YEAR_DAYS = 365.25
+# Stored fluxes are kg of carbon m-2 s-1; the files hold mmol of CO2 m-2 d-1.
+KG_A_SECOND = 12.011e-6 / 86_400
+
+
+def main():
+    options = arguments()
+    with tempfile.TemporaryDirectory(dir=options.folder) as folder:
+        folder = Path(options.data or folder)
+        folder.mkdir(parents=True, exist_ok=True)
+        product, _builds = stats.data(options, folder)
+        peer = stats.Peer(folder, options)
+        ring = stats.outline(0.007)
+        with tempfile.TemporaryDirectory(dir=folder) as work:
+            theirs, peer_s = xarray(folder, Path(work), peer, ring)
+            own = Own(options, folder, product, ring)
+            try:
+                own_s = {" + ".join(asked): own.derive(asked) for asked in (CLIMATOLOGY, ANOMALY, TREND, LEAST_SQUARES, ALL)}
+                worst = compared(own.exported(Path(work)), theirs)
+            finally:
+                own.forget()
+        print_table(options, own_s, peer_s, theirs["cells"], worst)
+
+
+def arguments():
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--program", required=True, help="the fluxglobe to measure")
+    parser.add_argument("--years", type=int, default=16, help="years of days")
+    parser.add_argument("--folder", help="where temporary files are made")
+    parser.add_argument("--data", help="folder that keeps what was made and landed, for another run")
+    parser.add_argument("--json", action="store_true", help="figures as JSON")
+    return parser.parse_args()
+
+
+class Own:
+    """Products that are derived, each under a name that no run before has taken: what is there already is not derived again."""
+
+    def __init__(self, options, folder, product, ring):
+        self.program, self.folder, self.product = options.program, folder / "data", product
+        self.region = "POLYGON((" + ",".join(f"{x} {y}" for x, y in [*ring, ring[0]]) + "))"
+        self.name = f"{NAME}-{int(time.time())}"
+        self.count = 0
+        # Every file that is read was read before.
+        self.derive(["mean"])
+
+    def derive(self, statistics):
+        """Seconds of the whole command."""
+        tiles.say(f"fluxglobe: {', '.join(statistics)}")
+        self.count += 1
+        begin = time.perf_counter()
+        words = ["--region", self.region, "--statistic", ",".join(statistics), "--least-percent", 0, "--name", self.named(statistics)]
+        tiles.run(self.program, "--data", self.folder, "derive", "statistic", "--product", self.product, *words)
+        return time.perf_counter() - begin
+
+    def named(self, statistics):
+        return f"{self.name}-{self.count}" if len(statistics) > 1 else f"{self.name}-{self.count}-{statistics[0]}"
+
+    def exported(self, work):
+        """What was found, by statistic, as arrays in the memory of whoever looks at them."""
+        import xarray as xr
+
+        listed = json.loads(tiles.run(self.program, "--data", self.folder, "products", "--json"))
+        found = {}
+        for product in sorted(row["product"] for row in listed if row["product"].startswith(self.name)):
+            statistic = product.removeprefix(f"{self.name}-").split("-", 1)[1]
+            target = work / f"{product}.zarr"
+            if statistic in found or statistic == "mean":
+                continue
+            tiles.run(self.program, "--data", self.folder, "export", product, "--to", "zarr", target)
+            cube = xr.open_zarr(target)
+            array = next(array for name, array in cube.data_vars.items() if array.ndim == 3)
+            names = {"latitude": "lat", "longitude": "lon"}
+            found[statistic] = array.rename({long: short for long, short in names.items() if long in array.dims})
+        return found
+
+    def forget(self):
+        """Removes what was derived."""
+        for folder in (self.folder / "objects").glob(f"*/{self.name}-*"):
+            shutil.rmtree(folder)
+
+
+def xarray(folder, work, peer, ring):
+    """The same with the peers: what they find, and seconds of each part."""
+    import flox  # noqa: F401 - xarray groups with it
+    import xarray as xr
+
+    rows, cols, weights, cells = stats.polygon_weights(peer, ring)
+    inside = weights > 0
+    whole = xr.open_zarr(folder / "times.zarr")["flux"][:, rows, cols]
+    mask = xr.DataArray(inside, dims=("lat", "lon"), coords={"lat": whole["lat"], "lon": whole["lon"]})
+    window = whole.where(mask)
+    # Every file that is read was read before.
+    whole.mean().compute()
+    found, parts = {"cells": cells}, {}
+    with xr.set_options(use_flox=True):
+        tiles.say("xarray and flox: climatology")
+        begin = time.perf_counter()
+        found["climatology"] = window.groupby("time.month").mean().compute()
+        found["climatology"].to_dataset(name="climatology").to_zarr(work / "climatology.zarr")
+        parts["climatology"] = time.perf_counter() - begin
+
+        tiles.say("xarray and flox: anomaly")
+        begin = time.perf_counter()
+        months = window.groupby("time.month")
+        found["anomaly"] = stored(months - months.mean(), work / "anomaly.zarr")
+        parts["anomaly"] = time.perf_counter() - begin
+
+        tiles.say("xarray and flox: means of months, seasons taken off")
+        begin = time.perf_counter()
+        means = window.resample(time="MS").mean().compute()
+        months = means.groupby("time.month")
+        off = (months - months.mean()).values.astype("float64")
+        parts["means of months"] = time.perf_counter() - begin
+    years = middles(means["time"].values)
+    found["months"] = len(years)
+    begin = time.perf_counter()
+    found["least squares"] = least_squares(off, years)
+    parts["least squares"] = time.perf_counter() - begin
+    tiles.say("pymannkendall")
+    found["places"], found["tests"], a_cell = tested(off, years, inside)
+    parts["test of all cells"] = a_cell * cells
+    parts["test of one cell"] = a_cell
+    found["lat"], found["lon"] = window["lat"].values, window["lon"].values
+    return found, parts
+
+
+def stored(anomaly, place):
+    """Anomalies in the layout that they are read in: chunks of all of time."""
+    import xarray as xr
+
+    anomaly = anomaly.drop_vars("month", errors="ignore").astype("float32").chunk({"time": -1, "lat": 41, "lon": 45})
+    anomaly = anomaly.transpose("time", "lat", "lon").to_dataset(name="anomaly")
+    for name in anomaly.variables:
+        anomaly[name].encoding = {}
+    anomaly.to_zarr(place)
+    return xr.open_zarr(place)["anomaly"]
+
+
+def middles(months):
+    """Middles of months, years after the first one's."""
+    import numpy as np
+
+    last = months[-1].astype("datetime64[M]") + np.timedelta64(1, "M")
+    edges = np.append(months.astype("datetime64[M]"), last).astype("datetime64[ms]")
+    middle = edges[:-1] + (edges[1:] - edges[:-1]) / 2
+    return (middle - middle[0]).astype("float64") / 86_400_000 / YEAR_DAYS
+
+
+def least_squares(values, years):
+    """Slope a year and its p value of each cell, of values without gaps in `[time, lat, lon]`; NaN elsewhere."""
+    import numpy as np
+    from scipy.stats import t
+
+    n = len(years)
+    x = years - years.mean()
+    mean = values.mean(axis=0)
+    slope = np.tensordot(x, values, axes=(0, 0)) / (x @ x)
+    left = values - mean - slope * x[:, None, None]
+    squares = (left**2).sum(axis=0)
+    r = np.clip((left[:-1] * left[1:]).sum(axis=0) / squares, 0, 1)
+    freedom = n * (1 - r) / (1 + r) - 2
+    with np.errstate(invalid="ignore", divide="ignore"):
+        error = np.sqrt(squares / freedom / (x @ x))
+        p = 2 * t.sf(np.abs(slope / error), freedom)
+    return {"least-squares-trend": slope, "least-squares-trend-p-value": p}
+
+
+def tested(values, years, inside):
+    """Cells spread over the polygon, slope a year, p value and variance of each, and seconds that the test of one takes all processors."""
+    import numpy as np
+
+    places = np.argwhere(inside & ~np.isnan(values).any(axis=0))
+    places = places[:: max(len(places) // TREND_CELLS, 1)][:TREND_CELLS]
+    series = [values[:, row, col] for row, col in places]
+    workers = os.cpu_count()
+    with ProcessPoolExecutor(workers) as pool:
+        # Whoever is started imports first; that is not timed.
+        list(pool.map(test_of, [series[0]] * workers * 2))
+        begin = time.perf_counter()
+        tests = list(pool.map(test_of, series, chunksize=25))
+        a_cell = (time.perf_counter() - begin) / len(series)
+        # Its own slope is one of steps at equal distances, which months are not; ours and this one know their middles. Not timed.
+        slopes = list(pool.map(slope_of, [(one, years) for one in series], chunksize=25))
+    return places, [(slope, *test) for slope, test in zip(slopes, tests)], a_cell
+
+
+def test_of(values):
+    import pymannkendall
+
+    test = pymannkendall.hamed_rao_modification_test(values)
+    return test.p, test.var_s, test.s
+
+
+def slope_of(asked):
+    from scipy.stats import theilslopes
+
+    return theilslopes(*asked)[0]
+
+
+def compared(ours, theirs):
+    """How far answers are apart; the program ends where that is much."""
+    import numpy as np
+
+    worst = {}
+
+    def check(name, own, other, most=TOLERANCE, scale=None):
+        own, other = np.asarray(own, "float64"), np.asarray(other, "float64")
+        if own.shape != other.shape or (np.isnan(own) != np.isnan(other)).any():
+            gaps = (np.isnan(own) != np.isnan(other)).sum() if own.shape == other.shape else "all"
+            sys.exit(f"{name}: shapes {own.shape}, {other.shape}, or gaps at {gaps} other places")
+        worst[name] = float(np.nanmax(np.abs(own - other)) / (scale or np.nanmax(np.abs(other))))
+        if worst[name] > most:
+            sys.exit(f"{name}: answers differ by {worst[name]:.2e}, where {most:.0e} is allowed")
+
+    lat, lon = theirs["lat"], theirs["lon"]
+
+    def cells(statistic):
+        return ours[statistic].sel(lat=lat, lon=lon, method="nearest")
+
+    check("climatology", cells("climatology").values, theirs["climatology"].values * KG_A_SECOND)
+    steps = np.unique(np.linspace(0, theirs["anomaly"].sizes["time"] - 1, STEPS).round().astype(int))
+    own, other = cells("anomaly").isel(time=steps), theirs["anomaly"].isel(time=steps)
+    if (own["time"].values.astype("datetime64[D]") != other["time"].values.astype("datetime64[D]")).any():
+        sys.exit("anomaly: steps of other days")
+    check("anomaly", own.values, other.values * stats.GRAMS_A_YEAR)
+    slope = cells("least-squares-trend").isel(time=0).values
+    check("least-squares-trend", slope, theirs["least squares"]["least-squares-trend"] * stats.GRAMS_A_YEAR)
+    p_value = cells("least-squares-trend-p-value").isel(time=0).values
+    check("least-squares-trend-p-value", p_value, theirs["least squares"]["least-squares-trend-p-value"], most=1e-4, scale=1.0)
+    compare_tests(check, worst, cells, theirs)
+    return worst
+
+
+def compare_tests(check, worst, cells, theirs):
+    import numpy as np
+
+    rows, cols = theirs["places"].T
+    slope, p, variance, _score = np.array(theirs["tests"]).T
+    check("trend", cells("trend").isel(time=0).values[rows, cols], slope * stats.GRAMS_A_YEAR)
+    own = cells("trend-p-value").isel(time=0).values[rows, cols]
+    # Ours never takes autocorrelation for a reason to be surer: where the peer makes the variance smaller than that of values which do
+    # not go together, ours is that one's.
+    n = theirs["months"]
+    is_smaller = variance < n * (n - 1) * (2 * n + 5) / 18 * (1 - 1e-9)
+    worst["cells whose variance the peer makes smaller, of those tested"] = f"{is_smaller.sum()} of {len(p)}"
+    check("trend-p-value, of the others", own[~is_smaller], p[~is_smaller], most=1e-3, scale=1.0)
+
+
+def print_table(options, own_s, peer_s, cells, worst):
+    means = peer_s["means of months"]
+    theirs = {
+        "climatology": peer_s["climatology"],
+        "anomaly": peer_s["anomaly"],
+        "trend + trend-p-value": means + peer_s["test of all cells"],
+        "least-squares-trend + least-squares-trend-p-value": means + peer_s["least squares"],
+    }
+    theirs[" + ".join(ALL)] = peer_s["climatology"] + peer_s["anomaly"] + theirs["trend + trend-p-value"]
+    if options.json:
+        print(json.dumps({"ours_s": own_s, "peer_s": theirs, "peer_parts_s": peer_s, "cells": cells, "differ": worst}, indent=1))
+        return
+    print(f"{os.cpu_count()} processors, {options.years} years of days, {cells} cells of a polygon, files in the page cache, what is found is stored")
+    print(f"{'statistic':52}{'fluxglobe':>12}{'the peer':>12}{'times':>9}")
+    for name, seconds in own_s.items():
+        print(f"{name:52}{seconds:10.2f} s{theirs[name]:10.2f} s{theirs[name] / seconds:8.1f}x")
+    one = peer_s["test of one cell"] * 1e3
+    print(f"of the peer's trends {peer_s['test of all cells']:.1f} s are reckoned: {TREND_CELLS} cells were tested, one takes all processors {one:.2f} ms")
+    for name, value in worst.items():
+        print(f"  {name}: {value:.1e}" if isinstance(value, float) else f"  {name}: {value}")
+
+
+if __name__ == "__main__":
+    main()
