@@ -5,9 +5,7 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use contract::analysis::{
-    CalendarBins, LeastSquaresTrend, MannKendall, MapStatistic, Season,
-};
+use contract::analysis::{CalendarBins, LeastSquaresTrend, MannKendall, MapStatistic, Season};
 use contract::statistics::Percentile;
 use contract::time::{Period, TimeStep};
 
@@ -29,8 +27,8 @@ impl OfCells {
         for plan in plans {
             let mut own = OfCell::new(plan, periods);
             if is_trend(own.statistic) {
-                let same = each.iter().filter(|other| other.read == own.read);
-                let there = same.filter_map(|other| other.trend_steps.clone()).next();
+                let mut same = each.iter().filter(|other| other.read == own.read);
+                let there = same.find_map(|other| other.trend_steps.clone());
                 let find = || Arc::new(TrendSteps::of(&own.periods, TimeStep::Month));
                 own.trend_steps = Some(there.unwrap_or_else(find));
             }
@@ -60,14 +58,17 @@ impl OfCells {
 #[derive(Default)]
 struct Shared {
     /// Slope a decade, and its test.
-    trend: Option<(Range<usize>, Option<(f64, MannKendall)>)>,
-    least_squares: Option<(Range<usize>, Option<LeastSquaresTrend>)>,
-    season: Option<(Range<usize>, Option<Season>)>,
+    trend: Kept<(f64, MannKendall)>,
+    least_squares: Kept<LeastSquaresTrend>,
+    season: Kept<Season>,
 }
+
+/// What was found of some steps, if it was sought, and if it was there.
+type Kept<T> = Option<(Range<usize>, Option<T>)>;
 
 /// What was found of some steps, found now if it was not.
 fn once<'a, T>(
-    kept: &'a mut Option<(Range<usize>, Option<T>)>,
+    kept: &'a mut Kept<T>,
     steps: &Range<usize>,
     find: impl FnOnce() -> Option<T>,
 ) -> Option<&'a T> {
