@@ -12,6 +12,7 @@ import argparse
 import json
 import os
 import resource
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -23,6 +24,7 @@ import stats
 import tiles
 
 ROOMY_MIB = 2048
+NAME = "bench-memory"
 
 
 def main():
@@ -35,6 +37,9 @@ def main():
         for name, words in jobs(product):
             tiles.say(name)
             found = [ran(options, folder, mib, words) for mib in (options.memory_mib, ROOMY_MIB)]
+            # Maps that were derived for this alone.
+            for made in (folder / "data" / "objects").glob(f"*/{NAME}-*"):
+                shutil.rmtree(made)
             if found[0]["output"] != found[1]["output"]:
                 sys.exit(f"{name}: another answer with {options.memory_mib} MiB than with {ROOMY_MIB}")
             rows.append({"job": name, "peak_mib": [one["peak_mib"] for one in found], "seconds": [one["seconds"] for one in found]})
@@ -62,13 +67,23 @@ def arguments():
 
 def jobs(product):
     """Names and words: those of maps have names of their own, for what is there is not made again."""
-    names = [f"bench-memory-{int(time.time())}-{letter}" for letter in "ab"]
+    names = [f"{NAME}-{int(time.time())}-{letter}" for letter in "ab"]
+
+    def maps(*words):
+        return lambda mib: ["derive", "statistic", "--product", product, *words, "--name", names[mib == ROOMY_MIB]]
+
+    # Some 46,000 cells.
+    ring = stats.outline(0.007)
+    outline = "POLYGON((" + ",".join(f"{x} {y}" for x, y in [*ring, ring[0]]) + "))"
     whole = ["--region", "100.1,0.1,129.9,29.9", "--json"]
     polygon = ["stats", "polygon", "--product", product, *whole]
     yield "all cells: mean, deviation, extremes of every day", [*polygon, "--statistic", "mean,std,min,max", "--step", "native"]
     yield "all cells: p5, median, p95 of every month", [*polygon, "--statistic", "p5,median,p95", "--step", "month"]
     yield "budget by month", ["budget", "--product", product, "--step", "month", *whole]
-    yield "mean and deviation of every cell", lambda mib: ["derive", "statistic", "--product", product, "--statistic", "mean,spread", "--name", names[mib == ROOMY_MIB]]
+    yield "polygon: p5, median, p95 of every month", ["stats", "polygon", "--product", product, "--region", outline, "--json", "--statistic", "p5,median,p95", "--step", "month"]
+    yield "mean and deviation of every cell", maps("--statistic", "mean,spread")
+    yield "p5, median, p95 of every cell of the polygon", maps("--statistic", "p5,median,p95", "--region", outline)
+    yield "trend of every cell, and its significance", maps("--statistic", "trend,trend-p-value")
 
 
 def ran(options, folder, mib, words):
