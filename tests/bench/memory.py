@@ -98,8 +98,7 @@ def ran(options, folder, mib, words):
         done = subprocess.run([str(word) for word in command], capture_output=True, text=True)
         seconds = time.perf_counter() - begin
         peak = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024
-        # Versions of maps have names of their own.
-        output = "" if "derive" in words else done.stdout
+        output = made_of(folder, words[-1]) if "derive" in words else done.stdout
         told = {"failed": done.stderr[-2000:] if done.returncode else None, "output": output, "seconds": seconds, "peak_mib": peak}
         with os.fdopen(write, "w") as pipe:
             pipe.write(json.dumps(told))
@@ -111,6 +110,12 @@ def ran(options, folder, mib, words):
     if told["failed"] is not None:
         sys.exit(f"{' '.join(map(str, command))}: {told['failed']}")
     return told
+
+
+def made_of(folder, name):
+    """What maps that were derived hold: fields are named by the digest of their values."""
+    fields = (folder / "data" / "objects" / "frames").glob(f"{name}-*/**/*")
+    return sorted(f"{path.parent.name.removeprefix(name)}/{path.name}" for path in fields if path.is_file())
 
 
 if __name__ == "__main__":

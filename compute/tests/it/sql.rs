@@ -383,7 +383,10 @@ const REFUSED: &[(&str, &str)] = &[
         "SELECT * FROM budget('sst-test', 'global')",
         "only a carbon flux has a budget",
     ),
-    ("SELECT * FROM budget('sst-test', 'global', 'week')", "week"),
+    (
+        "SELECT * FROM budget('sst-test', 'global', 'fortnight')",
+        "fortnight",
+    ),
     ("SELECT * FROM budget('sst-test', 'atlantis')", "atlantis"),
     (
         "SELECT * FROM budget('atlantis', 'global')",
