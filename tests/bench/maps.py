@@ -8,9 +8,9 @@ ours as products (fields, a cube in both layouts, levels), the peer as Zarr in i
 this. Its least squares are worked out over all cells at once by NumPy; Mann and Kendall's test is pymannkendall's, cell by cell on
 all processors, of some cells, and the time of all is reckoned from theirs. All are compared before any figure is told.
 
-pymannkendall closes gaps: months on both sides of one are next to each other. With us a lag is a lag in time, so p values are
-compared with the formula of Hamed and Rao over its score and months in their places, and it is told how often both find the same
-trends significant.
+pymannkendall closes gaps: months on both sides of one are next to each other. With us a lag is a lag in time, so slopes and p values
+are compared with scipy's slope and the formula of Hamed and Rao over months in their places, of means in 64 bits (the peer's are of
+32), and it is told how often pymannkendall finds the same trends significant.
 
     make bench ARGS="maps --data FOLDER"      # the folder of `stats --data` may be used again
     make bench ARGS="maps --years 6"
@@ -42,6 +42,8 @@ TREND_CELLS = 1000
 # Values that a trend needs.
 LEAST_VALUES = 10
 SIGNIFICANT = 0.05
+# Share of cells whose p values may differ by rounding that turns a pair.
+OTHERWISE = 0.02
 # How far apart answers may be, as a share of the largest: the peer sums in 32 bits.
 TOLERANCE = 2e-5
 # Steps of which anomalies are compared.
@@ -98,7 +100,9 @@ class Own:
         begin = time.perf_counter()
         words = ["--region", self.region, "--statistic", ",".join(statistics), "--least-percent", 0, "--name", self.named(statistics)]
         tiles.run(self.program, "--data", self.folder, "derive", "statistic", "--product", self.product, *words)
-        return time.perf_counter() - begin
+        seconds = time.perf_counter() - begin
+        tiles.say(f"  {seconds:.2f} s")
+        return seconds
 
     def named(self, statistics):
         return f"{self.name}-{self.count}" if len(statistics) > 1 else f"{self.name}-{self.count}-{statistics[0]}"
@@ -165,10 +169,15 @@ def xarray(folder, work, peer, ring):
     parts["least squares"] = time.perf_counter() - begin
     tiles.say("pymannkendall")
     has_trend = (~np.isnan(off)).sum(axis=0) >= LEAST_VALUES
-    found["places"], found["tests"], a_cell = tested(off, years, has_trend)
+    places = np.argwhere(has_trend)
+    places = places[:: max(len(places) // TREND_CELLS, 1)][:TREND_CELLS]
+    found["places"] = places
+    found["tests"], a_cell = tested([off[:, row, col] for row, col in places])
+    found["trends"] = trends(window, places, years)
     parts["test of one cell"] = a_cell
     parts["tests"] = a_cell * int(has_trend.sum())
     found["lat"], found["lon"] = window["lat"].values, window["lon"].values
+    tiles.say(f"the peer: {parts}")
     return found, parts
 
 
@@ -229,41 +238,55 @@ def least_squares(values, years):
     return {"least-squares-trend": np.where(is_told, slope, np.nan), "least-squares-trend-p-value": np.where(is_told, p, np.nan)}
 
 
-def tested(values, years, has_trend):
-    """Cells spread over those that have a trend; slope a year, p value and pymannkendall's own of each; seconds that the test of one takes
-    all processors."""
-    import numpy as np
-
-    places = np.argwhere(has_trend)
-    places = places[:: max(len(places) // TREND_CELLS, 1)][:TREND_CELLS]
-    series = [values[:, row, col] for row, col in places]
+def tested(series):
+    """P values of pymannkendall, and seconds that the test of one series takes all processors."""
     workers = os.cpu_count()
     with ProcessPoolExecutor(workers) as pool:
         # Whoever is started imports first; that is not timed.
         list(pool.map(test_of, [series[0]] * workers * 2))
         begin = time.perf_counter()
         tests = list(pool.map(test_of, series, chunksize=25))
-        a_cell = (time.perf_counter() - begin) / len(series)
-        # Not timed: its own slope is one of steps at equal distances, which months are not.
-        in_time = list(pool.map(in_time_of, [(one, years, score) for one, (_p, score) in zip(series, tests)], chunksize=25))
-    return places, [(slope, p, own) for (slope, p), (own, _score) in zip(in_time, tests)], a_cell
+        return tests, (time.perf_counter() - begin) / len(series)
 
 
 def test_of(values):
-    """P value and score."""
     import pymannkendall
 
-    test = pymannkendall.hamed_rao_modification_test(values)
-    return test.p, test.s
+    return pymannkendall.hamed_rao_modification_test(values).p
+
+
+def trends(window, places, years):
+    """What trends of some cells are to be: slope a year and p value, from means in 64 bits. Not timed."""
+    import numpy as np
+    import xarray as xr
+
+    rows, cols = (xr.DataArray(side, dims="cell") for side in places.T)
+    values = window.isel(lat=rows, lon=cols).transpose("time", "cell")
+    month = values["time"].values.astype("datetime64[M]").astype(int)
+    month -= month[0]
+    values = values.values.astype("float64")
+    here = ~np.isnan(values)
+    sums, counts = np.zeros((2, len(years), len(places)))
+    np.add.at(sums, month, np.where(here, values, 0))
+    np.add.at(counts, month, here)
+    days = np.bincount(month)[:, None]
+    with np.errstate(invalid="ignore"):
+        means = np.where(counts >= 0.5 * days, sums / counts, np.nan)
+    # The first one is a January.
+    for calendar in range(12):
+        means[calendar::12] -= np.nanmean(means[calendar::12], axis=0)
+    with ProcessPoolExecutor(os.cpu_count()) as pool:
+        return list(pool.map(in_time_of, [(one, years) for one in means.T], chunksize=25))
 
 
 def in_time_of(asked):
-    """Slope a year through the middles of months, and the p value of a score with months in their places."""
+    """Slope a year through the middles of months, and Mann and Kendall's p value with months in their places."""
     import numpy as np
     from scipy.stats import norm, rankdata, theilslopes
 
-    values, years, score = asked
+    values, years = asked
     here = ~np.isnan(values)
+    score = np.sign(values[here][None, :] - values[here][:, None])[np.triu_indices(here.sum(), 1)].sum()
     slope = theilslopes(values[here], years[here])[0]
     steps, n = len(values), here.sum()
     ranks = np.zeros(steps)
@@ -319,11 +342,16 @@ def compare_tests(check, worst, cells, theirs):
     import numpy as np
 
     rows, cols = theirs["places"].T
-    slope, p, closed_up = np.array(theirs["tests"]).T
+    slope, p = np.array(theirs["trends"]).T
     check("trend", cells("trend").isel(time=0).values[rows, cols], slope * stats.GRAMS_A_YEAR)
     own = cells("trend-p-value").isel(time=0).values[rows, cols]
-    check("trend-p-value", own, p, most=1e-4, scale=1.0)
-    same = ((own < SIGNIFICANT) == (closed_up < SIGNIFICANT)).sum()
+    apart = np.abs(own - p)
+    # Values of one pair in many thousands that are almost equal change sides in another unit.
+    few = int((apart > 1e-5).sum())
+    worst["trend-p-value, beyond 1e-5"] = f"{few} of {len(p)} cells, {apart.max():.1e} at most"
+    if few > len(p) * OTHERWISE or np.isnan(apart).any():
+        sys.exit(f"trend-p-value: {few} of {len(p)} cells differ by up to {apart.max():.1e}")
+    same = ((own < SIGNIFICANT) == (np.array(theirs["tests"]) < SIGNIFICANT)).sum()
     worst["cells that pymannkendall finds significant where we do, and only there"] = f"{same} of {len(p)}"
 
 

@@ -8,7 +8,7 @@ use compute::budget::budget;
 use compute::reduce::statistics;
 use compute::sql::{Sql, SqlLimits};
 use compute::{ComputeError, Engine, Objects};
-use contract::analysis::{AnalysisOptions, AnalysisPart, SeriesWishes};
+use contract::analysis::{AnalysisOptions, AnalysisPart, SeriesAnalysis, SeriesWishes};
 use contract::budget::BudgetQuery;
 use contract::earth::Earth;
 use contract::geometry::AskedGeometry;
@@ -648,9 +648,8 @@ async fn budgets_are_tables_whose_sums_are_exact() {
     assert_eq!(one(&sql, closed).await, "true");
 }
 
-#[tokio::test(flavor = "multi_thread")]
-async fn analyses_are_tables() {
-    let (_folder, store) = folder_store();
+/// Eight years of months that rise by some 1.2 kelvin a decade, with a season; and what is told of a region of them.
+async fn analysed(store: &Store) -> (Engine, SeriesAnalysis) {
     let years = (2001..2009).flat_map(months).enumerate();
     let steps = years.map(|(month, period)| {
         let wave = (month % 12) as f32 + 0.01 * month as f32 + ((month * 7) % 5) as f32 * 0.1;
@@ -659,13 +658,8 @@ async fn analyses_are_tables() {
     });
     let steps: Vec<(Period, Vec<f32>)> = steps.collect();
     let quantity = Quantity::SeaSurfaceTemperature;
-    land(&store, &product("sst"), quantity, GRID, &steps).await;
+    let manifest = land(store, &product("sst"), quantity, GRID, &steps).await;
     let engine = Engine::in_process(store.clone(), parts(2));
-    let sql = sql_of(&engine);
-    let manifest = storage::manifests::latest(&store, &product("sst"))
-        .await
-        .unwrap()
-        .unwrap();
     let id = manifest.id();
     let of = SeriesWishes {
         region: Some("162,-10,170,10".parse().unwrap()),
@@ -673,18 +667,21 @@ async fn analyses_are_tables() {
     };
     let of = of.query(product("sst")).unwrap();
     let options = AnalysisOptions::new(AnalysisPart::ALL.to_vec()).unwrap();
-    let answer = analyse(&engine, (&manifest, &id), &of, &options)
-        .await
-        .unwrap();
-    let table = |word: &str, columns: &str| {
-        format!("SELECT {columns} FROM analysis('sst', '162,-10,170,10', '{word}')")
-    };
+    let answer = analyse(&engine, (&manifest, &id), &of, &options).await;
+    (engine, answer.unwrap())
+}
 
-    let rows = texts(
-        &sql,
-        &table("climatology", "bin, mean, spread, count, years, unit"),
-    )
-    .await;
+fn analysis_of(word: &str, columns: &str) -> String {
+    format!("SELECT {columns} FROM analysis('sst', '162,-10,170,10', '{word}')")
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn climatologies_and_anomalies_are_tables() {
+    let (_folder, store) = folder_store();
+    let (engine, answer) = analysed(&store).await;
+    let sql = sql_of(&engine);
+    let asked = analysis_of("climatology", "bin, mean, spread, count, years, unit");
+    let rows = texts(&sql, &asked).await;
     let own = answer.climatology.as_ref().unwrap();
     assert_eq!(rows.len(), 12);
     for (row, own) in rows.iter().zip(&own.rows) {
@@ -693,9 +690,8 @@ async fn analyses_are_tables() {
         assert_eq!(row[1..3], numbers);
         assert_eq!(row[3..], ["8", "8", "°C"]);
     }
-
     let columns = "time_start, value, normal, anomaly, standardised";
-    let rows = texts(&sql, &table("anomaly", columns)).await;
+    let rows = texts(&sql, &analysis_of("anomaly", columns)).await;
     let own = answer.anomaly.as_ref().unwrap();
     assert_eq!(rows.len(), 96);
     for (row, own) in rows.iter().zip(&own.rows) {
@@ -703,9 +699,17 @@ async fn analyses_are_tables() {
         assert_eq!(row[0], own.start.to_string());
         assert_eq!(row[1..], numbers.map(|number| number.unwrap().to_string()));
     }
+    let seasons = "SELECT count(*) FROM analysis('sst', '162.3,0.5', 'climatology', 'season')";
+    assert_eq!(one(&sql, seasons).await, "4");
+}
 
+#[tokio::test(flavor = "multi_thread")]
+async fn a_trend_is_a_table_of_one_row_or_an_error_that_says_why_there_is_none() {
+    let (_folder, store) = folder_store();
+    let (engine, answer) = analysed(&store).await;
+    let sql = sql_of(&engine);
     let columns = "slope_per_decade, lower_per_decade, upper_per_decade, p_value, tau, least_squares_per_decade, least_squares_p_value, count, deseasonalised, unit";
-    let rows = texts(&sql, &table("trend", columns)).await;
+    let rows = texts(&sql, &analysis_of("trend", columns)).await;
     let own = answer.trend.as_ref().unwrap();
     let (robust, squares) = (&own.theil_sen, &own.least_squares);
     let numbers = [
@@ -718,16 +722,10 @@ async fn analyses_are_tables() {
         squares.p_value.unwrap(),
     ];
     assert_eq!(rows.len(), 1);
-    let told: Vec<f64> = rows[0][..7]
-        .iter()
-        .map(|text| text.parse().unwrap())
-        .collect();
-    assert_eq!(told, numbers);
+    let told = rows[0][..7].iter().map(|text| text.parse().unwrap());
+    assert_eq!(told.collect::<Vec<f64>>(), numbers);
     assert_eq!(rows[0][7..], ["96", "true", "°C per decade"]);
     assert!(robust.slope_per_decade > 1.0, "{robust:?}");
-
-    let seasons = "SELECT count(*) FROM analysis('sst', '162.3,0.5', 'climatology', 'season')";
-    assert_eq!(one(&sql, seasons).await, "4");
     let yearly = "SELECT count FROM analysis('sst', '162.3,0.5', 'trend', 'year')";
     let error = ask(&sql, yearly).await.unwrap_err().to_string();
     assert!(
