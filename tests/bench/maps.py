@@ -42,7 +42,7 @@ TREND_CELLS = 1000
 # Values that a trend needs.
 LEAST_VALUES = 10
 SIGNIFICANT = 0.05
-# Share of cells whose p values may differ by rounding that turns a pair.
+# Share of cells whose p values may differ by more than a thousandth.
 OTHERWISE = 0.02
 # How far apart answers may be, as a share of the largest: the peer sums in 32 bits.
 TOLERANCE = 2e-5
@@ -346,11 +346,12 @@ def compare_tests(check, worst, cells, theirs):
     check("trend", cells("trend").isel(time=0).values[rows, cols], slope * stats.GRAMS_A_YEAR)
     own = cells("trend-p-value").isel(time=0).values[rows, cols]
     apart = np.abs(own - p)
-    # Values of one pair in many thousands that are almost equal change sides in another unit.
-    few = int((apart > 1e-5).sum())
-    worst["trend-p-value, beyond 1e-5"] = f"{few} of {len(p)} cells, {apart.max():.1e} at most"
-    if few > len(p) * OTHERWISE or np.isnan(apart).any():
-        sys.exit(f"trend-p-value: {few} of {len(p)} cells differ by up to {apart.max():.1e}")
+    # The two values whose slope is the median tie by construction once it is taken off: rounding decides which ranks first, and where
+    # a lag is just significant or just not, that decides it. So does another unit in one and the same program.
+    beyond = {limit: int((apart > limit).sum()) for limit in (1e-5, 1e-3)}
+    worst["trend-p-value"] = f"of {len(p)} cells {beyond[1e-5]} beyond 1e-5, {beyond[1e-3]} beyond 1e-3, {apart.max():.1e} at most"
+    if beyond[1e-3] > len(p) * OTHERWISE or np.isnan(apart).any():
+        sys.exit(f"trend-p-value: {worst['trend-p-value']}")
     same = ((own < SIGNIFICANT) == (np.array(theirs["tests"]) < SIGNIFICANT)).sum()
     worst["cells that pymannkendall finds significant where we do, and only there"] = f"{same} of {len(p)}"
 
