@@ -5,7 +5,9 @@
 //! has the same bits on any machine; reading and decoding ahead use its other processors (docs/decisions/031).
 
 mod about;
+mod analysis;
 mod axes;
+mod budget;
 mod columns;
 mod limits;
 mod mean_weighted;
@@ -22,6 +24,7 @@ mod statistics;
 mod tables;
 mod told;
 mod version;
+mod worked_out;
 mod yielding;
 
 pub use limits::SqlLimits;

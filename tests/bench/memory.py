@@ -12,6 +12,7 @@ import argparse
 import json
 import os
 import resource
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -23,6 +24,7 @@ import stats
 import tiles
 
 ROOMY_MIB = 2048
+NAME = "bench-memory"
 
 
 def main():
@@ -35,6 +37,9 @@ def main():
         for name, words in jobs(product):
             tiles.say(name)
             found = [ran(options, folder, mib, words) for mib in (options.memory_mib, ROOMY_MIB)]
+            # Maps that were derived for this alone.
+            for made in (folder / "data" / "objects").glob(f"*/{NAME}-*"):
+                shutil.rmtree(made)
             if found[0]["output"] != found[1]["output"]:
                 sys.exit(f"{name}: another answer with {options.memory_mib} MiB than with {ROOMY_MIB}")
             rows.append({"job": name, "peak_mib": [one["peak_mib"] for one in found], "seconds": [one["seconds"] for one in found]})
@@ -62,13 +67,23 @@ def arguments():
 
 def jobs(product):
     """Names and words: those of maps have names of their own, for what is there is not made again."""
-    names = [f"bench-memory-{int(time.time())}-{letter}" for letter in "ab"]
+    names = [f"{NAME}-{int(time.time())}-{letter}" for letter in "ab"]
+
+    def maps(*words):
+        return lambda mib: ["derive", "statistic", "--product", product, *words, "--name", names[mib == ROOMY_MIB]]
+
+    # Some 46,000 cells.
+    ring = stats.outline(0.007)
+    outline = "POLYGON((" + ",".join(f"{x} {y}" for x, y in [*ring, ring[0]]) + "))"
     whole = ["--region", "100.1,0.1,129.9,29.9", "--json"]
     polygon = ["stats", "polygon", "--product", product, *whole]
     yield "all cells: mean, deviation, extremes of every day", [*polygon, "--statistic", "mean,std,min,max", "--step", "native"]
     yield "all cells: p5, median, p95 of every month", [*polygon, "--statistic", "p5,median,p95", "--step", "month"]
     yield "budget by month", ["budget", "--product", product, "--step", "month", *whole]
-    yield "mean and deviation of every cell", lambda mib: ["derive", "statistic", "--product", product, "--statistic", "mean,spread", "--name", names[mib == ROOMY_MIB]]
+    yield "polygon: p5, median, p95 of every month", ["stats", "polygon", "--product", product, "--region", outline, "--json", "--statistic", "p5,median,p95", "--step", "month"]
+    yield "mean and deviation of every cell", maps("--statistic", "mean,spread")
+    yield "p5, median, p95 of every cell of the polygon", maps("--statistic", "p5,median,p95", "--region", outline)
+    yield "trend of every cell, and its significance", maps("--statistic", "trend,trend-p-value")
 
 
 def ran(options, folder, mib, words):
@@ -83,8 +98,7 @@ def ran(options, folder, mib, words):
         done = subprocess.run([str(word) for word in command], capture_output=True, text=True)
         seconds = time.perf_counter() - begin
         peak = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024
-        # Versions of maps have names of their own.
-        output = "" if "derive" in words else done.stdout
+        output = made_of(folder, words[-1]) if "derive" in words else done.stdout
         told = {"failed": done.stderr[-2000:] if done.returncode else None, "output": output, "seconds": seconds, "peak_mib": peak}
         with os.fdopen(write, "w") as pipe:
             pipe.write(json.dumps(told))
@@ -96,6 +110,12 @@ def ran(options, folder, mib, words):
     if told["failed"] is not None:
         sys.exit(f"{' '.join(map(str, command))}: {told['failed']}")
     return told
+
+
+def made_of(folder, name):
+    """What maps that were derived hold: fields are named by the digest of their values."""
+    fields = (folder / "data" / "objects" / "frames").glob(f"{name}-*/**/*")
+    return sorted(f"{path.parent.name.removeprefix(name)}/{path.name}" for path in fields if path.is_file())
 
 
 if __name__ == "__main__":

@@ -1,35 +1,89 @@
 //! How a series goes together with itself some steps later, and how many of its values are worth one of their own.
 
+/// Lags that are summed side by side.
+const LANES: usize = 8;
+
 /// Correlation of a series with itself `lag` steps later, -1 to 1; 0 where nothing is left to compare or nothing varies.
 ///
 /// `values` are one for each step at equal distances, NaN no data. Sums of products about the one mean over the sum of
 /// squares, as usual (Box and Jenkins 1976, section 2.1.5); with gaps the mean product over the pairs there are stands for all.
 pub fn autocorrelation(values: &[f64], lag: usize) -> f64 {
-    let present = values.iter().filter(|value| !value.is_nan());
-    let (sum, count) = present.fold((0.0, 0usize), |(sum, n), value| (sum + value, n + 1));
-    if count == 0 || lag >= values.len() {
+    if lag >= values.len() {
         return 0.0;
     }
-    let mean = sum / count as f64;
-    let squares: f64 = values
-        .iter()
-        .filter(|value| !value.is_nan())
-        .map(|value| (value - mean).powi(2))
-        .sum();
-    let (mut products, mut pairs) = (0.0, 0usize);
-    for (a, b) in values.iter().zip(&values[lag..]) {
-        if !a.is_nan() && !b.is_nan() {
-            products += (a - mean) * (b - mean);
-            pairs += 1;
+    let about = About::mean_of(values);
+    let (mut products, mut pairs) = (0.0, 0.0);
+    for at in 0..values.len() - lag {
+        products += about.left[at] * about.left[at + lag];
+        pairs += about.is_there[at] * about.is_there[at + lag];
+    }
+    about.correlation(values.len(), lag, products, pairs)
+}
+
+/// The same at every lag from 0 on, one for each value.
+pub fn autocorrelations(values: &[f64]) -> Vec<f64> {
+    let steps = values.len();
+    let mut about = About::mean_of(values);
+    // What is beyond the end adds nothing, so that lags can be summed side by side, each in the order of time.
+    about.left.resize(steps + LANES, 0.0);
+    about.is_there.resize(steps + LANES, 0.0);
+    let mut found = Vec::with_capacity(steps + LANES);
+    for first in (0..steps).step_by(LANES) {
+        let (mut products, mut pairs) = ([0.0; LANES], [0.0; LANES]);
+        for at in 0..steps - first {
+            let (left, is_there) = (about.left[at], about.is_there[at]);
+            let later = &about.left[at + first..][..LANES];
+            let later_there = &about.is_there[at + first..][..LANES];
+            for lane in 0..LANES {
+                products[lane] += left * later[lane];
+                pairs[lane] += is_there * later_there[lane];
+            }
+        }
+        let lags = first..(first + LANES).min(steps);
+        let each = lags.zip(products.into_iter().zip(pairs));
+        found.extend(
+            each.map(|(lag, (products, pairs))| about.correlation(steps, lag, products, pairs)),
+        );
+    }
+    found
+}
+
+/// Values less their mean.
+struct About {
+    /// 0 where there is no data.
+    left: Vec<f64>,
+    /// 1 where there is data, else 0.
+    is_there: Vec<f64>,
+    count: f64,
+    /// Sum of the squares of what is left.
+    squares: f64,
+}
+
+impl About {
+    fn mean_of(values: &[f64]) -> Self {
+        let present = values.iter().filter(|value| !value.is_nan());
+        let (sum, count) = present.fold((0.0, 0.0), |(sum, n), value| (sum + value, n + 1.0));
+        let mean = sum / count;
+        let less = |value: &f64| if value.is_nan() { 0.0 } else { value - mean };
+        let left: Vec<f64> = values.iter().map(less).collect();
+        let is_there = |value: &f64| if value.is_nan() { 0.0 } else { 1.0 };
+        Self {
+            squares: left.iter().map(|left| left.powi(2)).sum(),
+            left,
+            is_there: values.iter().map(is_there).collect(),
+            count,
         }
     }
-    if pairs == 0 || squares <= 0.0 {
-        return 0.0;
+
+    /// Of the sum of so many products at a lag.
+    fn correlation(&self, steps: usize, lag: usize, products: f64, pairs: f64) -> f64 {
+        if pairs <= 0.0 || self.squares <= 0.0 {
+            return 0.0;
+        }
+        // Equal to products / squares where no step is missing.
+        let of_all = (steps - lag) as f64 / steps as f64;
+        (products / pairs * of_all / (self.squares / self.count)).clamp(-1.0, 1.0)
     }
-    // Equal to products / squares where no step is missing.
-    let steps = values.len();
-    let of_all = (steps - lag) as f64 / steps as f64;
-    (products / pairs as f64 * of_all / (squares / count as f64)).clamp(-1.0, 1.0)
 }
 
 /// Effective number of `count` values whose errors go together with the next ones by `r`: n (1 - r) / (1 + r), never more
@@ -42,6 +96,25 @@ pub fn effective_count(count: usize, r: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn all_lags_at_once_have_the_bits_of_each() {
+        for count in [0, 1, 2, 7, 8, 9, 40, 193] {
+            let wave = |at: usize| (at as f64 * 0.7).sin() + (at * at % 11) as f64;
+            let mut values: Vec<f64> = (0..count).map(wave).collect();
+            for gaps in [0, 1, 5] {
+                for at in (0..count).filter(|at| gaps > 0 && at % 7 < gaps) {
+                    values[at] = f64::NAN;
+                }
+                let all = autocorrelations(&values);
+                assert_eq!(all.len(), count);
+                for (lag, found) in all.iter().enumerate() {
+                    let own = autocorrelation(&values, lag);
+                    assert_eq!(own.to_bits(), found.to_bits(), "{count} {gaps} {lag}");
+                }
+            }
+        }
+    }
 
     /// By hand: 1, 2, 3, 4 about 2.5: squares 5; one later 0.75 - 0.25 + 0.75 = 1.25.
     #[test]

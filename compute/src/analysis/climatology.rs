@@ -101,15 +101,24 @@ pub fn anomalies(periods: &[Period], values: &[f64], climatology: &Climatology) 
 
 /// Values less the mean of their calendar month over the whole series, NaN no data.
 pub fn deseasonalised(periods: &[Period], values: &[f64]) -> Vec<f64> {
-    let (mut sums, mut counts) = ([0.0; 12], [0.0; 12]);
+    less_their_months(&months_of(periods), values)
+}
+
+/// Calendar months of some periods, from 0 for January.
+pub fn months_of(periods: &[Period]) -> Vec<usize> {
     let month = |period: &Period| CalendarBins::Month.of(*period);
-    for (period, value) in periods.iter().zip(values).filter(|(_, v)| !v.is_nan()) {
-        sums[month(period)] += value;
-        counts[month(period)] += 1.0;
+    periods.iter().map(month).collect()
+}
+
+/// [`deseasonalised`] of values whose months are known.
+pub fn less_their_months(months: &[usize], values: &[f64]) -> Vec<f64> {
+    let (mut sums, mut counts) = ([0.0; 12], [0.0; 12]);
+    for (month, value) in months.iter().zip(values).filter(|(_, v)| !v.is_nan()) {
+        sums[*month] += value;
+        counts[*month] += 1.0;
     }
-    let less =
-        |(period, value): (&Period, &f64)| value - sums[month(period)] / counts[month(period)];
-    periods.iter().zip(values).map(less).collect()
+    let less = |(month, value): (&usize, &f64)| value - sums[*month] / counts[*month];
+    months.iter().zip(values).map(less).collect()
 }
 
 /// Mean of values; none of none.

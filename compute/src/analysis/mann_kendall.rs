@@ -4,7 +4,7 @@ use std::cmp::Ordering;
 
 use contract::analysis::MannKendall;
 
-use super::autocorrelation::autocorrelation;
+use super::autocorrelation::autocorrelations;
 use super::distribution::{normal_quantile, normal_two_sided};
 use super::undefined::Undefined;
 
@@ -93,8 +93,7 @@ fn variance_correction(detrended: &[f64]) -> f64 {
     let n = ranks.iter().filter(|rank| !rank.is_nan()).count() as f64;
     let chance = normal_quantile() / n.sqrt();
     let mut sum = 0.0;
-    for lag in 1..ranks.len() {
-        let r = autocorrelation(&ranks, lag);
+    for (lag, r) in autocorrelations(&ranks).into_iter().enumerate().skip(1) {
         let left = n - lag as f64;
         // With gaps there are more lags than values; those count nothing.
         if r.abs() > chance && left > 2.0 {

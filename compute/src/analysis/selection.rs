@@ -2,30 +2,30 @@
 
 use std::collections::BTreeMap;
 
-/// Values that are sorted rather than counted: 8 MiB of them.
-pub const SORTED_AT_MOST: usize = 1 << 20;
+/// Values that are held rather than counted: 8 MiB of them.
+pub const HELD_AT_MOST: usize = 1 << 20;
 /// Bits of a digit.
 const DIGIT_BITS: u32 = 16;
 
 /// The values of the given ranks (from 0, the lowest) among `count` values, exact.
 ///
-/// `values` gives the same values in the same order each time it is called, none of them NaN. Few are sorted. Of many the
+/// `values` gives the same values in the same order each time it is called, none of them NaN. Few are held and selected from. Of many the
 /// digits are counted from the highest on, 16 bits a pass, for each rank among those that share its digits so far: four
 /// passes and half a MiB a rank, whatever their number.
 pub fn at_ranks<I: Iterator<Item = f64>>(
     values: impl Fn() -> I,
     count: usize,
     ranks: &[usize],
-    sorted_at_most: usize,
+    held_at_most: usize,
 ) -> Vec<f64> {
     assert!(
         ranks.iter().all(|rank| *rank < count),
         "ranks are below the number of values"
     );
-    if count <= sorted_at_most {
-        let mut sorted: Vec<f64> = values().collect();
-        sorted.sort_unstable_by(f64::total_cmp);
-        return ranks.iter().map(|rank| sorted[*rank]).collect();
+    if count <= held_at_most {
+        let mut keys = Vec::with_capacity(count);
+        keys.extend(values().map(key_of));
+        return of_keys(&mut keys, ranks);
     }
     // Of each rank: the digits found so far, and its rank among the values that have them.
     let mut found: Vec<(u64, usize)> = ranks.iter().map(|rank| (0, *rank)).collect();
@@ -57,6 +57,33 @@ pub fn at_ranks<I: Iterator<Item = f64>>(
         .iter()
         .map(|(digits, _)| of_ordered(*digits))
         .collect()
+}
+
+/// A value as a whole number, whose order is that of [`f64::total_cmp`]; of its own value again.
+pub fn key_of(value: f64) -> i64 {
+    turned(value.to_bits().cast_signed())
+}
+
+/// The bits but the sign turned where the sign is set.
+fn turned(bits: i64) -> i64 {
+    bits ^ ((bits >> 63).cast_unsigned() >> 1).cast_signed()
+}
+
+/// The values of the given ranks (from 0, the lowest) among those of some keys, which are brought into another order: nothing is
+/// sorted but what lies between.
+pub fn of_keys(keys: &mut [i64], ranks: &[usize]) -> Vec<f64> {
+    let mut wanted = ranks.to_vec();
+    wanted.sort_unstable();
+    // What is before the next rank asked for is in its place.
+    let mut done = 0;
+    for rank in wanted {
+        if rank >= done {
+            keys[done..].select_nth_unstable(rank - done);
+            done = rank + 1;
+        }
+    }
+    let value = |rank: &usize| f64::from_bits(turned(keys[*rank]).cast_unsigned());
+    ranks.iter().map(value).collect()
 }
 
 /// Bits whose order as whole numbers is that of the values.
@@ -93,7 +120,12 @@ mod tests {
             let ranks = [0, count - 1, seed as usize % count, count / 2];
             let sorted = at_ranks(|| values.iter().copied(), count, &ranks, usize::MAX);
             let counted = at_ranks(|| values.iter().copied(), count, &ranks, 0);
-            prop_assert_eq!(sorted, counted);
+            prop_assert_eq!(&sorted, &counted);
+            let mut all = values.clone();
+            all.sort_unstable_by(f64::total_cmp);
+            let bits: Vec<u64> = ranks.iter().map(|rank| all[*rank].to_bits()).collect();
+            let found: Vec<u64> = sorted.iter().map(|value| value.to_bits()).collect();
+            prop_assert_eq!(found, bits);
         }
     }
 }

@@ -14,34 +14,75 @@ pub fn middles_years(periods: &[Period]) -> Vec<f64> {
     periods.iter().map(years).collect()
 }
 
-/// Means of steps over bins of the calendar without a gap from the first to the last, NaN where less than half of a
-/// bin's time holds data: each step counts by the time of it that lies in the bin. Steps as they are for `Native`.
+/// Means of steps over bins of the calendar: see [`Bins::means`]; steps as they are for `Native`.
 ///
 /// `periods` are in the order of time and do not overlap; `values` are beside them, NaN no data, any unit.
 pub fn means_over(periods: &[Period], values: &[f64], step: TimeStep) -> (Vec<Period>, Vec<f64>) {
-    if step == TimeStep::Native {
-        return (periods.to_vec(), values.to_vec());
-    }
-    let bins = bins_over(periods, step);
-    let mut means = Vec::with_capacity(bins.len());
-    let mut from = 0;
-    for bin in &bins {
-        while from < periods.len() && periods[from].end <= bin.start {
-            from += 1;
+    let bins = Bins::over(periods, step);
+    let means = bins.means(values);
+    (bins.bins, means)
+}
+
+/// How steps lie in bins of the calendar: found once for all series over the same steps.
+#[derive(Debug)]
+pub struct Bins {
+    bins: Vec<Period>,
+    /// Of each bin the first step that reaches into it, and how many seconds of that and of each one after it lie in it; none
+    /// where steps are taken as they are.
+    inside: Option<Vec<(usize, Vec<f64>)>>,
+}
+
+impl Bins {
+    /// Bins without a gap from the first step to the last; the steps themselves for `Native`.
+    ///
+    /// `periods` are in the order of time and do not overlap.
+    pub fn over(periods: &[Period], step: TimeStep) -> Self {
+        let bins = bins_over(periods, step);
+        if step == TimeStep::Native {
+            return Self { bins, inside: None };
         }
-        let inside = periods[from..].iter().zip(&values[from..]);
-        let inside = inside.take_while(|(period, _)| period.start < bin.end);
-        let (mut sum, mut with_data_s) = (0.0, 0.0);
-        for (period, value) in inside.filter(|(_, value)| !value.is_nan()) {
-            let shared_ms = period.end.min(bin.end).ms() - period.start.max(bin.start).ms();
-            let shared_s = shared_ms as f64 / 1000.0;
-            sum += value * shared_s;
-            with_data_s += shared_s;
+        let mut inside = Vec::with_capacity(bins.len());
+        let mut from = 0;
+        for bin in &bins {
+            while from < periods.len() && periods[from].end <= bin.start {
+                from += 1;
+            }
+            let own = periods[from..].iter();
+            let own = own.take_while(|period| period.start < bin.end);
+            let shared_s = own.map(|period| {
+                let shared_ms = period.end.min(bin.end).ms() - period.start.max(bin.start).ms();
+                shared_ms as f64 / 1000.0
+            });
+            inside.push((from, shared_s.collect()));
         }
-        let is_held = with_data_s >= LEAST_SHARE * bin.seconds();
-        means.push(if is_held { sum / with_data_s } else { f64::NAN });
+        let inside = Some(inside);
+        Self { bins, inside }
     }
-    (bins, means)
+
+    /// The bins.
+    pub fn periods(&self) -> &[Period] {
+        &self.bins
+    }
+
+    /// Means over the bins, NaN where less than half of a bin's time holds data: each step counts by the time of it that lies
+    /// in the bin. `values` are one for each step, NaN no data, any unit.
+    pub fn means(&self, values: &[f64]) -> Vec<f64> {
+        let Some(inside) = &self.inside else {
+            return values.to_vec();
+        };
+        let mean = |(bin, (from, shared_s)): (&Period, &(usize, Vec<f64>))| {
+            let (mut sum, mut with_data_s) = (0.0, 0.0);
+            for (value, shared_s) in values[*from..].iter().zip(shared_s) {
+                if !value.is_nan() {
+                    sum += value * shared_s;
+                    with_data_s += shared_s;
+                }
+            }
+            let is_held = with_data_s >= LEAST_SHARE * bin.seconds();
+            if is_held { sum / with_data_s } else { f64::NAN }
+        };
+        self.bins.iter().zip(inside).map(mean).collect()
+    }
 }
 
 /// What steps may be gathered in: bins of the calendar that are no shorter than they are, else steps as they are.

@@ -1,14 +1,18 @@
 //! The trend of a series: seasons off, two slopes, a test.
 
-use contract::analysis::{CalendarBins, TheilSenTrend, Trend, TrendValue};
+use std::cmp::Ordering;
+
+use contract::analysis::{
+    CalendarBins, LeastSquaresTrend, MannKendall, TheilSenTrend, Trend, TrendValue,
+};
 use contract::time::{Period, TimeMs, TimeStep};
 
-use super::climatology::{deseasonalised, mean};
+use super::climatology::{less_their_months, mean, months_of};
 use super::extremes::percentile;
 use super::linear_trend::least_squares;
 use super::mann_kendall::{LEAST_VALUES, MOST_VALUES, mann_kendall};
 use super::theil_sen::Slopes;
-use super::timeline::{YEAR_MS, longest_s, means_over, middles_years, no_shorter};
+use super::timeline::{Bins, YEAR_MS, longest_s, middles_years, no_shorter};
 use super::undefined::Undefined;
 
 /// What an answer about a trend is called.
@@ -33,63 +37,166 @@ pub fn trend(
     step: TimeStep,
     unit: &str,
 ) -> Result<Trend, Undefined> {
-    let step = no_shorter(periods, step);
-    let (periods, values) = means_over(periods, values, step);
-    let here: Vec<usize> = (0..values.len()).filter(|i| !values[*i].is_nan()).collect();
-    let found = here.len();
-    let found_years = years_of(&periods, &values, &here)?;
-    let is_deseasonalised = longest_s(&periods) <= CalendarBins::Month.longest_step_s();
-    let basis = if is_deseasonalised {
-        deseasonalised(&periods, &values)
-    } else {
-        values.clone()
-    };
-    let years = middles_years(&periods);
-    let of_here = |all: &[f64]| -> Vec<f64> { here.iter().map(|i| all[*i]).collect() };
-    let (years_here, basis_here) = (of_here(&years), of_here(&basis));
-    let constant = || Undefined::Constant {
-        what: WHAT,
-        count: found,
-    };
-    let slopes = Slopes::of(&years_here, &basis_here).ok_or_else(constant)?;
-    let slope = slopes.median();
-    let detrended: Vec<f64> = basis
-        .iter()
-        .zip(&years)
-        .map(|(v, x)| v - slope * x)
-        .collect();
-    let test = mann_kendall(&basis, &detrended)?;
-    let (lower, upper) = slopes.interval(test.variance_correction);
-    let mid_years = mean(&years_here).ok_or_else(constant)?;
-    let mean_of_all = mean(&of_here(&values)).ok_or_else(constant)?;
-    let mean_of_basis = mean(&basis_here).ok_or_else(constant)?;
-    let about_mid = |(x, v): (&f64, &f64)| v - slope * (x - mid_years);
-    let mut about: Vec<f64> = years_here.iter().zip(&basis_here).map(about_mid).collect();
-    about.sort_unstable_by(f64::total_cmp);
-    let value = |i: &usize| TrendValue {
-        start: periods[*i].start,
-        end: periods[*i].end,
-        value: basis[*i] - mean_of_basis + mean_of_all,
-    };
-    let mid_ms = periods[0].mid().ms() + (mid_years * YEAR_MS).round() as i64;
-    Ok(Trend {
-        slope_unit: format!("{unit} per decade").trim_start().to_owned(),
-        step,
-        deseasonalised: is_deseasonalised,
-        count: found as u64,
-        years: found_years,
-        mid: TimeMs::new(mid_ms).unwrap_or_else(|_| periods[0].mid()),
-        mean: mean_of_all,
-        least_squares: least_squares(&years, &basis).ok_or_else(constant)?,
-        theil_sen: TheilSenTrend {
-            slope_per_decade: slope * DECADE,
-            lower_per_decade: lower * DECADE,
-            upper_per_decade: upper * DECADE,
-            at_mid: percentile(&about, 50.0) - mean_of_basis + mean_of_all,
-        },
-        mann_kendall: test,
-        values: here.iter().map(value).collect(),
-    })
+    TrendSteps::of(periods, step).trend(values, unit)
+}
+
+/// Steps that trends are found over: what all series over the same steps have in common.
+#[derive(Debug)]
+pub struct TrendSteps {
+    step: TimeStep,
+    bins: Bins,
+    /// Calendar month of each bin, from 0; none where bins are longer.
+    months: Option<Vec<usize>>,
+    /// Middle of each bin, years after the first one's.
+    years: Vec<f64>,
+}
+
+impl TrendSteps {
+    /// Steps in the order of time, gathered in means of `step` where they are no longer.
+    pub fn of(periods: &[Period], step: TimeStep) -> Self {
+        let step = no_shorter(periods, step);
+        let bins = Bins::over(periods, step);
+        let own = bins.periods();
+        let has_seasons = longest_s(own) <= CalendarBins::Month.longest_step_s();
+        let months = has_seasons.then(|| months_of(own));
+        Self {
+            step,
+            months,
+            years: middles_years(own),
+            bins,
+        }
+    }
+
+    /// The trend of a series over these steps, as [`trend`] tells it.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn trend(&self, values: &[f64], unit: &str) -> Result<Trend, Undefined> {
+        let basis = self.basis(values)?;
+        let Basis {
+            here,
+            means,
+            values: of_basis,
+            years_here,
+            values_here,
+            ..
+        } = &basis;
+        let (slopes, slope, test) = basis.tested(&self.years)?;
+        let (lower, upper) = slopes.interval(test.variance_correction);
+        let constant = || basis.constant();
+        let periods = self.bins.periods();
+        let mid_years = mean(years_here).ok_or_else(constant)?;
+        let means_here: Vec<f64> = here.iter().map(|i| means[*i]).collect();
+        let mean_of_all = mean(&means_here).ok_or_else(constant)?;
+        let mean_of_basis = mean(values_here).ok_or_else(constant)?;
+        let about_mid = |(x, v): (&f64, &f64)| v - slope * (x - mid_years);
+        let mut about: Vec<f64> = years_here.iter().zip(values_here).map(about_mid).collect();
+        about.sort_unstable_by(f64::total_cmp);
+        let value = |i: &usize| TrendValue {
+            start: periods[*i].start,
+            end: periods[*i].end,
+            value: of_basis[*i] - mean_of_basis + mean_of_all,
+        };
+        let mid_ms = periods[0].mid().ms() + (mid_years * YEAR_MS).round() as i64;
+        Ok(Trend {
+            slope_unit: format!("{unit} per decade").trim_start().to_owned(),
+            step: self.step,
+            deseasonalised: self.months.is_some(),
+            count: here.len() as u64,
+            years: basis.spanned_years,
+            mid: TimeMs::new(mid_ms).unwrap_or_else(|_| periods[0].mid()),
+            mean: mean_of_all,
+            least_squares: least_squares(&self.years, of_basis).ok_or_else(constant)?,
+            theil_sen: TheilSenTrend {
+                slope_per_decade: slope * DECADE,
+                lower_per_decade: lower * DECADE,
+                upper_per_decade: upper * DECADE,
+                at_mid: percentile(&about, 50.0) - mean_of_basis + mean_of_all,
+            },
+            mann_kendall: test,
+            values: here.iter().map(value).collect(),
+        })
+    }
+
+    /// Theil and Sen's slope alone, a decade, and the test of it: those of [`Self::trend`].
+    ///
+    /// # Errors
+    /// As there.
+    pub fn tested_slope(&self, values: &[f64]) -> Result<(f64, MannKendall), Undefined> {
+        let basis = self.basis(values)?;
+        let (_slopes, slope, test) = basis.tested(&self.years)?;
+        Ok((slope * DECADE, test))
+    }
+
+    /// The trend by least squares alone: that of [`Self::trend`].
+    ///
+    /// # Errors
+    /// As there.
+    pub fn least_squares(&self, values: &[f64]) -> Result<LeastSquaresTrend, Undefined> {
+        let basis = self.basis(values)?;
+        // Seasons and nothing else: the test refuses what is left of them.
+        let first = basis.values_here[0];
+        let is_first = |value: &f64| value.partial_cmp(&first).is_some_and(Ordering::is_eq);
+        if basis.values_here.iter().all(is_first) {
+            return Err(basis.constant());
+        }
+        least_squares(&self.years, &basis.values).ok_or_else(|| basis.constant())
+    }
+
+    /// What slopes are sought in.
+    fn basis(&self, values: &[f64]) -> Result<Basis, Undefined> {
+        let means = self.bins.means(values);
+        let here: Vec<usize> = (0..means.len()).filter(|i| !means[*i].is_nan()).collect();
+        let spanned_years = years_of(self.bins.periods(), &means, &here)?;
+        let values = match &self.months {
+            Some(months) => less_their_months(months, &means),
+            None => means.clone(),
+        };
+        let of_here = |all: &[f64]| -> Vec<f64> { here.iter().map(|i| all[*i]).collect() };
+        Ok(Basis {
+            years_here: of_here(&self.years),
+            values_here: of_here(&values),
+            here,
+            means,
+            values,
+            spanned_years,
+        })
+    }
+}
+
+/// A series that slopes are sought in.
+struct Basis {
+    /// Bins with data.
+    here: Vec<usize>,
+    /// Of every bin, NaN no data.
+    means: Vec<f64>,
+    /// The same, seasons off.
+    values: Vec<f64>,
+    /// Middles of the bins with data, years.
+    years_here: Vec<f64>,
+    /// Their values, seasons off.
+    values_here: Vec<f64>,
+    /// Years that they span.
+    spanned_years: f64,
+}
+
+impl Basis {
+    fn constant(&self) -> Undefined {
+        Undefined::Constant {
+            what: WHAT,
+            count: self.here.len(),
+        }
+    }
+
+    /// All slopes, their median, and the test; `years` are the middles of all bins.
+    fn tested(&self, years: &[f64]) -> Result<(Slopes<'_>, f64, MannKendall), Undefined> {
+        let slopes = Slopes::of(&self.years_here, &self.values_here);
+        let slopes = slopes.ok_or_else(|| self.constant())?;
+        let slope = slopes.median();
+        let less = |(v, x): (&f64, &f64)| v - slope * x;
+        let detrended: Vec<f64> = self.values.iter().zip(years).map(less).collect();
+        Ok((slopes, slope, mann_kendall(&self.values, &detrended)?))
+    }
 }
 
 /// Years that values span, if a trend can be told from them; `here` are the places of those with data.

@@ -92,7 +92,7 @@ pub fn derive_statistics<'a>(
                 wanted: &wanted,
             };
             let derived = match plan.statistic {
-                MapStatistic::Anomaly => landing.anomalies(&computed, progress).await?,
+                MapStatistic::Anomaly => landing.anomalies(computed, progress).await?,
                 _ => landing.each(computed).await?,
             };
             made.push(commit(engine, &source, derived).await?);

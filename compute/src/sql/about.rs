@@ -12,7 +12,7 @@ use datafusion::catalog::{MemTable, TableProvider};
 use futures::{StreamExt as _, TryStreamExt as _, stream};
 use storage::manifests;
 
-use super::{mean_weighted, statistics};
+use super::{analysis, budget, mean_weighted, statistics};
 use crate::expression::function::{ALL, Function};
 use crate::{ComputeError, Engine};
 
@@ -91,7 +91,12 @@ pub(super) async fn products(
 
 /// A row a function that no other SQL has.
 pub(super) fn functions() -> Result<Arc<dyn TableProvider>, ComputeError> {
-    let others = [mean_weighted::ABOUT, statistics::ABOUT];
+    let others = [
+        mean_weighted::ABOUT,
+        statistics::ABOUT,
+        budget::ABOUT,
+        analysis::ABOUT,
+    ];
     let row = |it: &Function| {
         [
             it.name.to_owned(),

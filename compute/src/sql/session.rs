@@ -25,10 +25,11 @@ use super::mean_weighted::MeanWeighted;
 use super::rows::BATCH_ROWS;
 use super::running::{Rows, Turn};
 use super::statement::{LARGE, statement};
-use super::statistics::{self, StatisticsFunction};
 use super::tables::Tables;
 use super::told::{overdue, told};
+use super::worked_out::AnswerFunction;
 use super::yielding::Yielding;
+use super::{analysis, budget, statistics};
 use crate::expression::udf::number_functions;
 use crate::{ComputeError, Engine};
 
@@ -68,8 +69,10 @@ impl Sql {
         }
         let builder = builder.with_physical_optimizer_rule(Arc::new(Yielding));
         let mut state = builder.with_config(config()).build();
-        let statistics = Arc::new(StatisticsFunction::new(engine));
-        state.register_udtf(statistics::NAME, statistics);
+        for kind in [&statistics::KIND, &budget::KIND, &analysis::KIND] {
+            let function = Arc::new(AnswerFunction::new(kind, engine));
+            state.register_udtf(kind.name, function);
+        }
         Ok(Self {
             engine: engine.clone(),
             limits,

@@ -534,3 +534,38 @@ async fn memory_changes_no_bit_and_what_it_cannot_hold_is_refused() {
     let refused = derived(&tiny, &of("tiny")).await.unwrap_err();
     assert!(refused.to_string().contains("--memory-mib"), "{refused}");
 }
+
+#[tokio::test(flavor = "multi_thread")]
+async fn anomalies_have_the_same_bits_from_blocks_and_from_fields() {
+    let (_folder, store) = folder_store();
+    let source = landed(&store).await;
+    let roomy = Engine::in_process(store.clone(), parts(2));
+    // No run of steps has room in it.
+    let small = roomy.clone().with_memory_bytes(160 << 10);
+    let options = |name: &str, region: Option<&str>| MapOptions {
+        from: "2002-03".parse().ok(),
+        ..of(MapStatistic::Anomaly, region, name)
+    };
+    for (number, region) in [None, Some("-20,25,-5,38")].into_iter().enumerate() {
+        let names = ["roomy", "small"].map(|name| format!("{name}-{number}"));
+        let made = derived(&roomy, &options(&names[0], region)).await.unwrap();
+        let other = derived(&small, &options(&names[1], region)).await.unwrap();
+        assert_eq!((made.steps.len(), other.steps.len()), (22, 22));
+        for step in 0..22 {
+            assert_eq!(made.steps[step].period, source.steps[14 + step].period);
+            assert_eq!(made.steps[step].valid_cells, other.steps[step].valid_cells);
+            let (a, b) = (
+                read(&store, &made, step).await,
+                read(&store, &other, step).await,
+            );
+            assert!(a.iter().zip(&b).all(|(a, b)| a.to_bits() == b.to_bits()));
+            // By hand: -1, 0, 1 of the years.
+            let year = (14 + step) / 12;
+            let inside = a[at(7, 15)];
+            assert!((inside - (year as f32 - 1.0)).abs() < 1e-6, "{inside}");
+            assert_eq!(a[at(7, 30)].is_nan(), region.is_some());
+            let held = a.iter().filter(|value| !value.is_nan()).count();
+            assert_eq!(made.steps[step].valid_cells, held as u64);
+        }
+    }
+}

@@ -3,15 +3,19 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use compute::analysis::analyse;
+use compute::budget::budget;
 use compute::reduce::statistics;
 use compute::sql::{Sql, SqlLimits};
 use compute::{ComputeError, Engine, Objects};
+use contract::analysis::{AnalysisOptions, AnalysisPart, SeriesAnalysis, SeriesWishes};
+use contract::budget::BudgetQuery;
 use contract::earth::Earth;
 use contract::geometry::AskedGeometry;
 use contract::grid::{Grid, LonLatDeg};
 use contract::quantity::Quantity;
 use contract::statistics::StatisticsQuery;
-use contract::time::{Period, TimeMs};
+use contract::time::{Period, TimeMs, TimeStep};
 use datafusion::arrow::array::{Array as _, AsArray as _, RecordBatch};
 use datafusion::arrow::compute::concat_batches;
 use datafusion::arrow::datatypes::{Float32Type, Float64Type, Int64Type, TimestampMillisecondType};
@@ -370,6 +374,44 @@ const REFUSED: &[(&str, &str)] = &[
     ("SELECT 1 / 0", "ivide by zero"),
     ("SELECT * FROM stats('sst-test')", "stats takes texts"),
     ("SELECT * FROM stats('sst-test', 'atlantis')", "atlantis"),
+    ("SELECT * FROM budget('sst-test')", "budget takes texts"),
+    (
+        "SELECT * FROM budget('sst-test', 'global', 'total', 'x')",
+        "budget takes texts",
+    ),
+    (
+        "SELECT * FROM budget('sst-test', 'global')",
+        "only a carbon flux has a budget",
+    ),
+    (
+        "SELECT * FROM budget('sst-test', 'global', 'fortnight')",
+        "fortnight",
+    ),
+    ("SELECT * FROM budget('sst-test', 'atlantis')", "atlantis"),
+    (
+        "SELECT * FROM budget('atlantis', 'global')",
+        "product \"atlantis\" is unknown",
+    ),
+    (
+        "SELECT * FROM analysis('sst-test', 'global')",
+        "analysis takes texts",
+    ),
+    (
+        "SELECT * FROM analysis('sst-test', 'global', 'season')",
+        "climatology, anomaly or trend",
+    ),
+    (
+        "SELECT * FROM analysis('sst-test', 'global', 'climatology', 'week')",
+        "month, season or day",
+    ),
+    (
+        "SELECT * FROM analysis('sst-test', '162.3,0.5', 'trend')",
+        "a trend needs 5 years of values, and they span 1.0",
+    ),
+    (
+        "SELECT * FROM analysis('sst-test', '162.3,0.5', 'climatology', 'day')",
+        "day",
+    ),
     (
         "SELECT * FROM stats('atlantis', 'global')",
         "product \"atlantis\" is unknown",
@@ -566,6 +608,130 @@ async fn functions_of_the_field_are_those_of_expressions_and_statistics_those_of
         let asked = format!("SELECT count(mean) FROM stats('sst-test', '{place}')");
         assert_eq!(one(&sql, &asked).await, "12", "{place}");
     }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn budgets_are_tables_whose_sums_are_exact() {
+    let (_folder, store) = folder_store();
+    let flux = months(2010).into_iter().enumerate().map(|(month, period)| {
+        let cell = |cell: usize| (1.0 + month as f32) * 1e-9 * ((cell % 13) as f32 - 5.0);
+        (period, (0..GRID.cell_count()).map(cell).collect())
+    });
+    let flux: Vec<(Period, Vec<f32>)> = flux.collect();
+    land(&store, &product("flux"), Quantity::CarbonFlux, GRID, &flux).await;
+    let engine = Engine::in_process(store.clone(), parts(2));
+    let sql = sql_of(&engine);
+    let before = store.list("").await.unwrap();
+    let columns = "time_start, budget_kg, budget_tg, coverage_percent, ocean_area_m2";
+    let asked =
+        format!("SELECT {columns} FROM budget('flux', '162,-10,170,10', 'month') ORDER BY 1");
+    let rows = texts(&sql, &asked).await;
+    assert_eq!(store.list("").await.unwrap(), before, "nothing is stored");
+    let query = BudgetQuery {
+        step: TimeStep::Month,
+        ..BudgetQuery::new(product("flux"), "162,-10,170,10".parse().unwrap())
+    };
+    let answer = budget(&engine, &query).await.unwrap();
+    assert_eq!((rows.len(), answer.rows.len()), (12, 12));
+    let number = |text: &str| text.parse::<f64>().unwrap();
+    for (row, own) in rows.iter().zip(&answer.rows) {
+        assert_eq!(row[0], own.start.to_string());
+        assert_eq!(number(&row[1]).to_bits(), number(&own.budget_kg).to_bits());
+        let numbers = [own.budget_tg, own.coverage_percent, own.ocean_area_m2];
+        for (text, own) in row[2..].iter().zip(numbers) {
+            assert_eq!(number(text).to_bits(), own.to_bits());
+        }
+    }
+    // Months sum to their year exactly, as decimals do.
+    let closed = "SELECT (SELECT sum(budget_kg) FROM budget('flux', '162,-10,170,10', 'month'))
+        = (SELECT budget_kg FROM budget('flux', '162,-10,170,10')) AS closed";
+    assert_eq!(one(&sql, closed).await, "true");
+}
+
+/// Eight years of months that rise by some 1.2 kelvin a decade, with a season; and what is told of a region of them.
+async fn analysed(store: &Store) -> (Engine, SeriesAnalysis) {
+    let years = (2001..2009).flat_map(months).enumerate();
+    let steps = years.map(|(month, period)| {
+        let wave = (month % 12) as f32 + 0.01 * month as f32 + ((month * 7) % 5) as f32 * 0.1;
+        let cell = |cell: usize| 280.0 + wave + cell as f32 * 1e-4;
+        (period, (0..GRID.cell_count()).map(cell).collect())
+    });
+    let steps: Vec<(Period, Vec<f32>)> = steps.collect();
+    let quantity = Quantity::SeaSurfaceTemperature;
+    let manifest = land(store, &product("sst"), quantity, GRID, &steps).await;
+    let engine = Engine::in_process(store.clone(), parts(2));
+    let id = manifest.id();
+    let of = SeriesWishes {
+        region: Some("162,-10,170,10".parse().unwrap()),
+        ..SeriesWishes::default()
+    };
+    let of = of.query(product("sst")).unwrap();
+    let options = AnalysisOptions::new(AnalysisPart::ALL.to_vec()).unwrap();
+    let answer = analyse(&engine, (&manifest, &id), &of, &options).await;
+    (engine, answer.unwrap())
+}
+
+fn analysis_of(word: &str, columns: &str) -> String {
+    format!("SELECT {columns} FROM analysis('sst', '162,-10,170,10', '{word}')")
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn climatologies_and_anomalies_are_tables() {
+    let (_folder, store) = folder_store();
+    let (engine, answer) = analysed(&store).await;
+    let sql = sql_of(&engine);
+    let asked = analysis_of("climatology", "bin, mean, spread, count, years, unit");
+    let rows = texts(&sql, &asked).await;
+    let own = answer.climatology.as_ref().unwrap();
+    assert_eq!(rows.len(), 12);
+    for (row, own) in rows.iter().zip(&own.rows) {
+        let numbers = [own.mean, own.spread].map(|number| number.unwrap().to_string());
+        assert_eq!(row[0], own.bin);
+        assert_eq!(row[1..3], numbers);
+        assert_eq!(row[3..], ["8", "8", "°C"]);
+    }
+    let columns = "time_start, value, normal, anomaly, standardised";
+    let rows = texts(&sql, &analysis_of("anomaly", columns)).await;
+    let own = answer.anomaly.as_ref().unwrap();
+    assert_eq!(rows.len(), 96);
+    for (row, own) in rows.iter().zip(&own.rows) {
+        let numbers = [own.value, own.normal, own.anomaly, own.standardised];
+        assert_eq!(row[0], own.start.to_string());
+        assert_eq!(row[1..], numbers.map(|number| number.unwrap().to_string()));
+    }
+    let seasons = "SELECT count(*) FROM analysis('sst', '162.3,0.5', 'climatology', 'season')";
+    assert_eq!(one(&sql, seasons).await, "4");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_trend_is_a_table_of_one_row_or_an_error_that_says_why_there_is_none() {
+    let (_folder, store) = folder_store();
+    let (engine, answer) = analysed(&store).await;
+    let sql = sql_of(&engine);
+    let columns = "slope_per_decade, lower_per_decade, upper_per_decade, p_value, tau, least_squares_per_decade, least_squares_p_value, count, deseasonalised, unit";
+    let rows = texts(&sql, &analysis_of("trend", columns)).await;
+    let own = answer.trend.as_ref().unwrap();
+    let (robust, squares) = (&own.theil_sen, &own.least_squares);
+    let numbers = [
+        robust.slope_per_decade,
+        robust.lower_per_decade,
+        robust.upper_per_decade,
+        own.mann_kendall.p_value,
+        own.mann_kendall.tau,
+        squares.slope_per_decade,
+        squares.p_value.unwrap(),
+    ];
+    assert_eq!(rows.len(), 1);
+    let told = rows[0][..7].iter().map(|text| text.parse().unwrap());
+    assert_eq!(told.collect::<Vec<f64>>(), numbers);
+    assert_eq!(rows[0][7..], ["96", "true", "°C per decade"]);
+    assert!(robust.slope_per_decade > 1.0, "{robust:?}");
+    let yearly = "SELECT count FROM analysis('sst', '162.3,0.5', 'trend', 'year')";
+    let error = ask(&sql, yearly).await.unwrap_err().to_string();
+    assert!(
+        error.contains("needs 10 values, and there are 8"),
+        "{error}"
+    );
 }
 
 #[tokio::test(flavor = "multi_thread")]

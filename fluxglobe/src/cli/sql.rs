@@ -21,6 +21,8 @@ Examples:
   fluxglobe sql \"SELECT time_start, mean_weighted(value, area_km2) AS mean FROM takahashi09_flux
                  WHERE latitude BETWEEN -10 AND 10 GROUP BY time_start ORDER BY time_start\"
   fluxglobe sql \"SELECT * FROM stats('takahashi09-flux', 'global', 'year', 'mean,p90')\" --format json
+  fluxglobe sql \"SELECT * FROM budget('takahashi09-flux', '14s-14n', 'season')\"
+  fluxglobe sql \"SELECT * FROM analysis('takahashi09-flux', 'global', 'climatology')\"
   fluxglobe sql \"SELECT * FROM takahashi09_flux WHERE time_start = '2000-07-01'\" --output july.parquet
   fluxglobe sql - < question.sql
   fluxglobe sql \"EXPLAIN SELECT value FROM takahashi09_flux WHERE longitude > 170\"

@@ -87,3 +87,30 @@ fn what_has_no_trend_is_refused_with_the_reason() {
     let seasons: Vec<f64> = (0..72).map(|m| f64::from(m % 12)).collect();
     assert!(refused(72, &seasons, TimeStep::Month).contains("equal"));
 }
+
+#[test]
+fn parts_of_a_trend_are_those_of_the_whole_of_series_that_share_their_steps() {
+    let periods = months(96);
+    let steps = TrendSteps::of(&periods, TimeStep::Month);
+    for seed in 0..5 {
+        let value = |m: usize| rising(96)[m] + ((m * (7 + seed)) % 11) as f64 * 0.3;
+        let mut values: Vec<f64> = (0..96).map(value).collect();
+        for gap in (seed..96).step_by(9).take(4 * seed) {
+            values[gap] = f64::NAN;
+        }
+        let whole = trend(&periods, &values, TimeStep::Month, "").unwrap();
+        assert_eq!(steps.trend(&values, "").unwrap(), whole);
+        let (slope, test) = steps.tested_slope(&values).unwrap();
+        assert_eq!(
+            (slope, &test),
+            (whole.theil_sen.slope_per_decade, &whole.mann_kendall)
+        );
+        assert_eq!(steps.least_squares(&values).unwrap(), whole.least_squares);
+    }
+    let seasons: Vec<f64> = (0..96).map(|m| f64::from(m % 12)).collect();
+    let why = trend(&periods, &seasons, TimeStep::Month, "").unwrap_err();
+    assert_eq!(
+        steps.least_squares(&seasons).unwrap_err().to_string(),
+        why.to_string().replace("a test for a trend", "a trend")
+    );
+}

@@ -4,13 +4,16 @@ use std::ops::Range;
 
 use contract::chunk::{Window, windows};
 use contract::manifest::Manifest;
-use cube::{BLOCK_CELLS, Values};
+use cube::{BLOCK_CELLS, Block, RUN_STEPS, Values};
 
 use super::wanted::Wanted;
 use crate::ComputeError;
 
 /// Share of the memory for work that the values of some blocks take.
 const HELD_SHARE: usize = 8;
+
+/// Share of the memory for work that the values of all blocks in a run of steps may take, if runs are to be held.
+const RUN_SHARE: usize = 8;
 
 /// Cells over all steps.
 pub(super) struct Cells {
@@ -25,18 +28,24 @@ pub(super) struct Blocks {
     /// By their numbers, increasing.
     windows: Vec<(u32, Window)>,
     at_once: usize,
+    /// Have all of them room at a run of steps?
+    is_run_held: bool,
 }
 
 impl Blocks {
     /// Those in which some cell is wanted; work may take so much memory.
     pub(super) fn of(manifest: &Manifest, wanted: &Wanted, memory_bytes: usize) -> Self {
-        let a_block = (BLOCK_CELLS * BLOCK_CELLS) as usize * manifest.steps.len().max(1);
+        let block_bytes = (BLOCK_CELLS * BLOCK_CELLS) as usize * size_of::<f32>();
+        let windows: Vec<(u32, Window)> = (0..)
+            .zip(windows(&manifest.grid, BLOCK_CELLS, BLOCK_CELLS))
+            .filter(|(_, window)| wanted.is_any_of(&manifest.grid, *window))
+            .collect();
+        let run_bytes = windows.len().saturating_mul(block_bytes * RUN_STEPS);
+        let all_bytes = block_bytes * manifest.steps.len().max(1);
         Self {
-            windows: (0..)
-                .zip(windows(&manifest.grid, BLOCK_CELLS, BLOCK_CELLS))
-                .filter(|(_, window)| wanted.is_any_of(&manifest.grid, *window))
-                .collect(),
-            at_once: (memory_bytes / HELD_SHARE / (a_block * size_of::<f32>())).max(1),
+            is_run_held: run_bytes <= memory_bytes / RUN_SHARE,
+            windows,
+            at_once: (memory_bytes / HELD_SHARE / all_bytes).max(1),
         }
     }
 
@@ -58,11 +67,7 @@ impl Blocks {
             .iter()
             .flat_map(|(_, block)| block.cell_indices(&manifest.grid));
         let places: Vec<usize> = places.collect();
-        let across = manifest.grid.cols.div_ceil(BLOCK_CELLS);
-        let asked: Vec<[u32; 2]> = blocks
-            .iter()
-            .map(|(number, _)| [number / across, number % across])
-            .collect();
+        let asked = at(blocks, manifest);
         let step_count = manifest.steps.len();
         let mut cells = Cells {
             values: vec![f32::NAN; places.len() * step_count],
@@ -80,4 +85,25 @@ impl Blocks {
         }
         Ok(cells)
     }
+
+    /// All of them at some steps that lie in one run; none where they take too much memory.
+    pub(super) async fn in_run(
+        &self,
+        values: &Values,
+        manifest: &Manifest,
+        steps: Range<usize>,
+    ) -> Result<Option<Vec<Block>>, ComputeError> {
+        if !self.is_run_held {
+            return Ok(None);
+        }
+        let asked = at(&self.windows, manifest);
+        Ok(Some(values.blocks(&asked, steps).await?))
+    }
+}
+
+/// Rows and columns of blocks.
+fn at(blocks: &[(u32, Window)], manifest: &Manifest) -> Vec<[u32; 2]> {
+    let across = manifest.grid.cols.div_ceil(BLOCK_CELLS);
+    let at = |(number, _): &(u32, Window)| [number / across, number % across];
+    blocks.iter().map(at).collect()
 }

@@ -3,15 +3,16 @@
 //! Several statistics of a cell share what they have in common: a trend, its test and its season are worked out once.
 
 use std::ops::Range;
+use std::sync::Arc;
 
-use contract::analysis::{CalendarBins, MapStatistic, Season, Trend};
+use contract::analysis::{CalendarBins, LeastSquaresTrend, MannKendall, MapStatistic, Season};
 use contract::statistics::Percentile;
 use contract::time::{Period, TimeStep};
 
 use super::plan::Plan;
 use crate::analysis::climatology::spread;
 use crate::analysis::harmonics::season;
-use crate::analysis::trend::trend;
+use crate::analysis::trend::TrendSteps;
 use crate::reduce::least_part;
 
 const DAY_MS: f64 = 86_400_000.0;
@@ -22,8 +23,18 @@ pub(super) struct OfCells(Vec<OfCell>);
 impl OfCells {
     /// Those of some plans over the steps of these periods.
     pub(super) fn new(plans: &[Plan], periods: &[Period]) -> Self {
-        let of_plan = |plan| OfCell::new(plan, periods);
-        Self(plans.iter().map(of_plan).collect())
+        let mut each: Vec<OfCell> = vec![];
+        for plan in plans {
+            let mut own = OfCell::new(plan, periods);
+            if is_trend(own.statistic) {
+                let mut same = each.iter().filter(|other| other.read == own.read);
+                let there = same.find_map(|other| other.trend_steps.clone());
+                let find = || Arc::new(TrendSteps::of(&own.periods, TimeStep::Month));
+                own.trend_steps = Some(there.unwrap_or_else(find));
+            }
+            each.push(own);
+        }
+        Self(each)
     }
 
     /// Values that a cell has of each statistic: bins of those that have them, else one.
@@ -46,13 +57,18 @@ impl OfCells {
 /// What several statistics of one cell are read from, by the steps that it is of.
 #[derive(Default)]
 struct Shared {
-    trend: Option<(Range<usize>, Option<Trend>)>,
-    season: Option<(Range<usize>, Option<Season>)>,
+    /// Slope a decade, and its test.
+    trend: Kept<(f64, MannKendall)>,
+    least_squares: Kept<LeastSquaresTrend>,
+    season: Kept<Season>,
 }
+
+/// What was found of some steps, if it was sought, and if it was there.
+type Kept<T> = Option<(Range<usize>, Option<T>)>;
 
 /// What was found of some steps, found now if it was not.
 fn once<'a, T>(
-    kept: &'a mut Option<(Range<usize>, Option<T>)>,
+    kept: &'a mut Kept<T>,
     steps: &Range<usize>,
     find: impl FnOnce() -> Option<T>,
 ) -> Option<&'a T> {
@@ -60,6 +76,17 @@ fn once<'a, T>(
         *kept = Some((steps.clone(), find()));
     }
     kept.as_ref().and_then(|(_, found)| found.as_ref())
+}
+
+/// Is it found through the steps that trends are found over?
+fn is_trend(statistic: MapStatistic) -> bool {
+    matches!(
+        statistic,
+        MapStatistic::Trend
+            | MapStatistic::TrendPValue
+            | MapStatistic::LeastSquaresTrend
+            | MapStatistic::LeastSquaresTrendPValue
+    )
 }
 
 /// One statistic of a cell.
@@ -75,6 +102,12 @@ struct OfCell {
     bin_of: Vec<usize>,
     /// Steps of each bin.
     steps_of: Vec<usize>,
+    /// Seconds of each step that is read.
+    seconds: Vec<f64>,
+    /// Of all of them.
+    all_s: f64,
+    /// For trends.
+    trend_steps: Option<Arc<TrendSteps>>,
 }
 
 impl OfCell {
@@ -85,7 +118,11 @@ impl OfCell {
         for bin in &bin_of {
             steps_of[*bin] += 1;
         }
+        let seconds: Vec<f64> = periods.iter().map(|period| period.seconds()).collect();
         Self {
+            all_s: seconds.iter().fold(0.0, |all, own| all + own),
+            seconds,
+            trend_steps: None,
             statistic: plan.statistic,
             bins: plan.bins,
             least_share: plan.least_share,
@@ -126,14 +163,12 @@ impl OfCell {
 
     /// Share of the time of all steps that holds data.
     fn time_share(&self, values: &[f32]) -> f64 {
-        let (mut with_data_s, mut all_s) = (0.0, 0.0);
-        for (period, value) in self.periods.iter().zip(values) {
-            all_s += period.seconds();
-            if !value.is_nan() {
-                with_data_s += period.seconds();
-            }
+        let mut with_data_s = 0.0;
+        for (seconds, value) in self.seconds.iter().zip(values) {
+            // Adding nothing is quicker than asking whether to add.
+            with_data_s += if value.is_nan() { 0.0 } else { *seconds };
         }
-        with_data_s / all_s
+        with_data_s / self.all_s
     }
 
     fn bin_means(&self, values: &[f32], out: &mut [f64]) {
@@ -180,14 +215,8 @@ impl OfCell {
             | MapStatistic::TrendPValue
             | MapStatistic::LeastSquaresTrend
             | MapStatistic::LeastSquaresTrendPValue => {
-                let find = || trend(&self.periods, &as_f64(values), TimeStep::Month, "").ok();
-                let found = once(&mut shared.trend, &self.read, find)?;
-                match self.statistic {
-                    MapStatistic::TrendPValue => Some(found.mann_kendall.p_value),
-                    MapStatistic::LeastSquaresTrend => Some(found.least_squares.slope_per_decade),
-                    MapStatistic::LeastSquaresTrendPValue => found.least_squares.p_value,
-                    _ => Some(found.theil_sen.slope_per_decade),
-                }
+                let steps = self.trend_steps.as_ref()?;
+                self.trend(steps, values, shared)
             }
             MapStatistic::Min | MapStatistic::MinTime => self.lowest(values, |value| value),
             MapStatistic::Max | MapStatistic::MaxTime => self.lowest(values, |value| -value),
@@ -196,6 +225,27 @@ impl OfCell {
             | MapStatistic::Coverage
             | MapStatistic::Climatology
             | MapStatistic::Anomaly => None,
+        }
+    }
+
+    fn trend(&self, steps: &TrendSteps, values: &[f32], shared: &mut Shared) -> Option<f64> {
+        match self.statistic {
+            MapStatistic::LeastSquaresTrend | MapStatistic::LeastSquaresTrendPValue => {
+                let find = || steps.least_squares(&as_f64(values)).ok();
+                let found = once(&mut shared.least_squares, &self.read, find)?;
+                match self.statistic {
+                    MapStatistic::LeastSquaresTrend => Some(found.slope_per_decade),
+                    _ => found.p_value,
+                }
+            }
+            _ => {
+                let find = || steps.tested_slope(&as_f64(values)).ok();
+                let (slope, test) = once(&mut shared.trend, &self.read, find)?;
+                Some(match self.statistic {
+                    MapStatistic::TrendPValue => test.p_value,
+                    _ => *slope,
+                })
+            }
         }
     }
 

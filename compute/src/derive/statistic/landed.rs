@@ -109,17 +109,11 @@ impl Landing<'_> {
     }
 
     /// Stores one step.
-    pub(super) async fn step(&self, output: &Output, values: &[f32]) -> Result<Step, ComputeError> {
+    async fn step(&self, output: &Output, values: &[f32]) -> Result<Step, ComputeError> {
         let (store, grid) = (self.engine.store(), &self.source.grid);
-        Ok(Step {
-            masked: None,
-            period: output.period,
-            field: fields::write(store, self.target, grid, values, output.period).await?,
-            raw_sha256: output.made_of,
-            origin: output.origin.clone(),
-            valid_cells: values.iter().filter(|value| !value.is_nan()).count() as u64,
-            contributed: None,
-        })
+        let field = fields::write(store, self.target, grid, values, output.period).await?;
+        let valid_cells = values.iter().filter(|value| !value.is_nan()).count();
+        Ok(output.step(field, valid_cells as u64))
     }
 
     /// The manifest, with number 0.
@@ -184,6 +178,8 @@ pub(super) struct Found {
     cells: Vec<bool>,
     /// Lowest and highest value.
     range: [f64; 2],
+    /// How many values there were.
+    pub(super) valid_cells: u64,
 }
 
 impl Found {
@@ -191,6 +187,7 @@ impl Found {
         Self {
             cells: vec![false; cell_count],
             range: [f64::INFINITY, f64::NEG_INFINITY],
+            valid_cells: 0,
         }
     }
 
@@ -198,6 +195,7 @@ impl Found {
         for (cell, value) in self.cells.iter_mut().zip(values) {
             if !value.is_nan() {
                 *cell = true;
+                self.valid_cells += 1;
                 let [low, high] = self.range;
                 self.range = [low.min(f64::from(*value)), high.max(f64::from(*value))];
             }
@@ -208,6 +206,7 @@ impl Found {
         for (own, other) in self.cells.iter_mut().zip(&other.cells) {
             *own |= other;
         }
+        self.valid_cells += other.valid_cells;
         let ([low, high], [other_low, other_high]) = (self.range, other.range);
         self.range = [low.min(other_low), high.max(other_high)];
     }

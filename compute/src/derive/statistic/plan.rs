@@ -29,6 +29,21 @@ pub(super) struct Output {
     pub(super) made_of: Digest,
 }
 
+impl Output {
+    /// What a manifest says of it.
+    pub(super) fn step(&self, field: ObjectKey, valid_cells: u64) -> Step {
+        Step {
+            masked: None,
+            period: self.period,
+            field,
+            raw_sha256: self.made_of,
+            origin: self.origin.clone(),
+            valid_cells,
+            contributed: None,
+        }
+    }
+}
+
 /// What is read and written.
 #[derive(Debug, Clone)]
 pub(super) struct Plan {
@@ -96,6 +111,11 @@ impl Plan {
                 None => format!("{title}, where {least} % or more hold data"),
             },
         })
+    }
+
+    /// Steps that anomalies are written of.
+    pub(super) fn written(&self) -> Range<usize> {
+        self.first_written..self.first_written + self.outputs.len()
     }
 
     /// Was a version made of these very steps in this very way?
