@@ -233,6 +233,23 @@ mod tests {
     }
 
     #[tokio::test]
+    async fn questions_that_nobody_waits_for_are_not_remembered() {
+        let gate = gate(4);
+        let first = gate.enter(client(1)).await.unwrap();
+        for _ in 0..100 {
+            drop(waiting(&gate, 2));
+        }
+        {
+            let state = gate.0.state();
+            let held: usize = state.questions.values().map(VecDeque::len).sum();
+            assert_eq!((held, state.order.len(), state.waiting), (1, 1, 0));
+        }
+        // And they take no place from those that come.
+        let all = [("own", waiting(&gate, 2)), ("other", waiting(&gate, 3))];
+        assert_eq!(order(first, all.into()), ["own", "other"]);
+    }
+
+    #[tokio::test]
     async fn who_stops_waiting_gives_the_place_back_and_is_passed_over() {
         let gate = gate(2);
         let first = gate.enter(client(1)).await.unwrap();

@@ -106,6 +106,21 @@ async fn parts_are_those_of_the_whole_and_copies_are_known_again() {
         (again.status, again.body.len()),
         (StatusCode::NOT_MODIFIED, 0)
     );
+    // Who has a part of it wants the rest, or all of what came since.
+    for (tag, status) in [
+        (tag, StatusCode::PARTIAL_CONTENT),
+        ("\"another\"", StatusCode::OK),
+    ] {
+        let headers = [("range", "bytes=5-"), ("if-range", tag)];
+        let answer = app.get_with(path, &headers).await;
+        assert_eq!(answer.status, status, "{tag}");
+        let start = if status == StatusCode::OK { 0 } else { 5 };
+        assert_eq!(answer.body, whole.body[start..], "{tag}");
+    }
+    // Nobody has a right copy of what is not there.
+    let nothing = path.replace("carbon_flux", "nothing");
+    let nothing = app.get_with(&nothing, &[("if-none-match", tag)]).await;
+    assert_eq!(nothing.status, StatusCode::NOT_FOUND);
     let cached = |answer: &crate::app::Answer| answer.headers[header::CACHE_CONTROL].clone();
     assert!(cached(&whole).to_str().unwrap().contains("immutable"));
     assert!(!cached(&metadata).to_str().unwrap().contains("immutable"));
