@@ -1,6 +1,6 @@
 //! Products that are attached again: what is kept of the version before, what is read anew, and what is refused.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use contract::grid::Grid;
@@ -241,7 +241,7 @@ fn profile(own: &Own, more: &str) -> PathBuf {
     path
 }
 
-fn by_profile(own: &Own, profile: &PathBuf) -> Request {
+fn by_profile(own: &Own, profile: &Path) -> Request {
     Request {
         profile: Some(profile.to_str().unwrap().to_owned()),
         variable: None,
