@@ -48,6 +48,7 @@ mod reading;
 mod recomputed;
 #[cfg(test)]
 mod regions;
+mod remembered_sums;
 #[cfg(test)]
 mod sql;
 #[cfg(test)]

@@ -534,3 +534,77 @@ async fn memory_changes_no_bit_and_what_it_cannot_hold_is_refused() {
     let refused = derived(&tiny, &of("tiny")).await.unwrap_err();
     assert!(refused.to_string().contains("--memory-mib"), "{refused}");
 }
+
+#[tokio::test(flavor = "multi_thread")]
+async fn statistics_of_different_periods_share_nothing_but_the_reading() {
+    let (_folder, store) = folder_store();
+    landed(&store).await;
+    let engine = Engine::in_process(store.clone(), parts(2));
+    let of = |statistic, from: &str, name: &str| MapOptions {
+        from: from.parse().ok(),
+        ..of(statistic, None, name)
+    };
+    let both = [
+        of(MapStatistic::Amplitude, "2001", "a"),
+        of(MapStatistic::Amplitude, "2002-06", "b"),
+        of(MapStatistic::Phase, "2001-09", "c"),
+    ];
+    let made = derive_statistics(&engine, &product("wind"), &both, &|_| ()).await;
+    for (made, (options, name)) in made.unwrap().iter().zip(both.iter().zip(["x", "y", "z"])) {
+        let alone = MapOptions {
+            name: Some(product(name)),
+            ..options.clone()
+        };
+        let alone = derived(&engine, &alone).await.unwrap();
+        assert_eq!(made.steps[0].period, alone.steps[0].period);
+        let (own, right) = (read(&store, made, 0).await, read(&store, &alone, 0).await);
+        assert!(
+            own.iter()
+                .zip(&right)
+                .all(|(a, b)| a.to_bits() == b.to_bits()),
+            "{name}"
+        );
+    }
+}
+
+/// Two years of which a cell has both, one, or none; and two Januaries of those years.
+#[tokio::test(flavor = "multi_thread")]
+async fn just_as_much_as_is_asked_for_is_enough_and_anomalies_have_the_domain_of_all_steps() {
+    let (_folder, store) = folder_store();
+    let engine = Engine::in_process(store.clone(), parts(2));
+    let values = |year: usize| -> Vec<f32> {
+        let value = |cell: usize| match cell % 3 {
+            0 => 5.0 + year as f32,
+            1 if year == 0 => 9.0,
+            _ => f32::NAN,
+        };
+        (0..GRID.cell_count()).map(value).collect()
+    };
+    let years = [0, 1].map(|year| (Period::year(2001 + year as i32).unwrap(), values(year)));
+    let months = [0, 1].map(|year| (Period::month(2001 + year as i32, 1).unwrap(), values(year)));
+    for (name, steps, statistic) in [
+        ("years", years, MapStatistic::Mean),
+        ("months", months, MapStatistic::Climatology),
+    ] {
+        land(&store, &product(name), Quantity::WindSpeed, GRID, &steps).await;
+        for (least_percent, is_enough) in [(50, true), (51, false)] {
+            let options = MapOptions {
+                least_percent,
+                name: Some(product(&format!("{name}-{least_percent}"))),
+                ..MapOptions::new(statistic)
+            };
+            let made = derive_statistic(&engine, &product(name), &options, &|_| ()).await;
+            let map = read(&store, &made.unwrap(), 0).await;
+            assert_eq!(map[0].to_bits(), 5.5f32.to_bits(), "{name}");
+            assert_eq!(map[1].is_nan(), !is_enough, "{name} {least_percent}");
+            assert!(map[2].is_nan());
+        }
+    }
+    let anomalies = MapOptions::new(MapStatistic::Anomaly);
+    let made = derive_statistic(&engine, &product("months"), &anomalies, &|_| ()).await;
+    let made = made.unwrap();
+    let last = read(&store, &made, 1).await;
+    assert!(last[1].is_nan() && !read(&store, &made, 0).await[1].is_nan());
+    let cells = domain::read(&store, &made.domain).await.unwrap();
+    assert_eq!(cells[..3], [true, true, false]);
+}
