@@ -48,6 +48,7 @@ mod reading;
 mod recomputed;
 #[cfg(test)]
 mod regions;
+#[cfg(test)]
 mod remembered_sums;
 #[cfg(test)]
 mod sql;

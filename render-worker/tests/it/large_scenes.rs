@@ -110,7 +110,7 @@ async fn ocean(store: &Store) -> [Manifest; 2] {
     let flux = product(store, "flux", Quantity::CarbonFlux, GRID, &months).await;
     let sum = |month: usize| -> Vec<f32> {
         let all = values(0.01, month, false);
-        let is_known = |cell: usize| (cell % COLS) % 9 > 1 && (cell / COLS) % 5 > 0;
+        let is_known = |cell: usize| (cell % COLS) % 9 > 1 && !(cell / COLS).is_multiple_of(5);
         let value = |(cell, value): (usize, f32)| {
             if is_known(cell) {
                 value + 0.1
