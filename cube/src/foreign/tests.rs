@@ -7,8 +7,8 @@ use std::sync::Arc;
 use contract::grid::Grid;
 use contract::quantity::Quantity;
 use contract::time::Period;
-use icechunk::format::Path;
 use icechunk::format::snapshot::NodeData;
+use icechunk::format::{ChunkIndices, Path};
 use storage::Store;
 use storage::attached::StoreKind;
 use tempfile::TempDir;
@@ -53,8 +53,20 @@ impl Other {
             folder,
             repository: repository.unwrap(),
         };
-        own.put(290.0, 290.0).await;
+        own.put(290.0, 291.0).await;
         own
+    }
+
+    /// Has the second chunk hold what the first one does.
+    async fn replace_second(&self) {
+        let session = self.repository.session().await.unwrap();
+        let mut session = session.write().await;
+        let path = Path::new(&format!("/{}", variable())).unwrap();
+        let [first, second] = [0, 1].map(|col| ChunkIndices(vec![0, 0, col]));
+        let payload = session.get_chunk_ref(&path, &first).await.unwrap();
+        assert!(payload.is_some());
+        session.set_chunk_ref(path, second, payload).await.unwrap();
+        session.commit("one chunk").execute().await.unwrap();
     }
 
     /// Its one step, with a value for each of its chunks.
@@ -102,7 +114,7 @@ fn part(cols: Range<u64>) -> [Range<u64>; 3] {
 async fn what_changed_since_a_state_is_told_chunk_by_chunk() {
     let other = Other::new().await;
     let before = other.state().await;
-    other.put(290.0, 291.0).await;
+    other.replace_second().await;
     let now = other.open().await.unwrap();
     let changed = now.changed_since(&before, &variable()).await.unwrap();
     let is_unchanged = |cols: Range<u64>| {
@@ -116,6 +128,8 @@ async fn what_changed_since_a_state_is_told_chunk_by_chunk() {
     let of_other = now.changed_since(&before, "lat").await.unwrap();
     let whole = now.is_unchanged(&variable(), &part(0..615), &of_other);
     assert!(whole.unwrap());
+    let east = now.read(&variable(), &part(SECOND..SECOND + 1), Absent::Fill);
+    assert_eq!(east.await.unwrap()[0].to_bits(), 290f64.to_bits());
     let own = now.found.snapshot.clone().unwrap();
     let none = now.changed_since(&own, &variable()).await.unwrap();
     assert!(now.is_unchanged(&variable(), &part(0..615), &none).unwrap());
