@@ -386,7 +386,11 @@ async fn a_valid_range_in_json_is_of_stored_numbers_unless_it_has_a_fraction() {
         own.edit(".zmetadata", |it| {
             it["metadata"]["sst/.zattrs"]["valid_max"] = highest.clone();
         });
-        own.attach().await.unwrap();
+        let told = own.attach().await.unwrap().assumptions;
+        assert!(
+            !told.iter().any(|line| line.contains("valid_max")),
+            "{told:?}"
+        );
         let newest = own.newest().await;
         let mut wanted = expected("v2-blosc.zarr").swap_remove(0);
         for value in &mut wanted {

@@ -84,10 +84,12 @@ async fn particles_drift_with_both_parts_of_a_vector_from_beyond_the_edges_of_a_
     assert!(with_data > 1000, "{with_data}");
     // A tile of 5.6 degrees of longitude shows 45 cells; they come from 64 farther away.
     assert!((173..=175).contains(&window.cols), "{}", window.cols);
+    assert!((115..=116).contains(&first_col), "{first_col}");
     let flux = product(&store, "flux", Quantity::CarbonFlux, GRID, &of_part(1e-9)).await;
     let map = of(&flux, None, Mode::Map, view);
     let map = windows(&store, &renderer).scene(&map).await.unwrap();
     assert!((53..=55).contains(&map.grid.cols), "{}", map.grid.cols);
+    assert!((175..=176).contains(&place(&map).0[1]), "{:?}", place(&map));
     // And that far no picture is another one.
     let whole = windows(&store, &renderer).holding_whole(u64::MAX);
     let wanted = renderer
@@ -251,4 +253,19 @@ async fn gaps_are_those_of_the_version_that_is_drawn_whatever_was_drawn_before()
     assert_ne!(of_first, of_second);
     let fresh = windows(&store, &renderer);
     assert_eq!(of_second, cells(&fresh, &now).await);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_domain_that_is_kept_is_not_that_of_another_grid() {
+    let store = Store::memory();
+    let [flux, _carbon] = ocean(&store).await;
+    let renderer = renderer();
+    let source = windows(&store, &renderer);
+    let own = of(&flux, None, Mode::Map, tile(1, 1, 0, 256));
+    source.scene(&own).await.unwrap();
+    let mut other = own.clone();
+    other.grid.west_deg = -180.0;
+    let error = source.scene(&other).await.unwrap_err().in_full();
+    assert!(error.contains("domain"), "{error}");
+    assert!(source.scene(&own).await.is_ok());
 }
