@@ -223,7 +223,7 @@ async fn gaps_are_those_of_the_version_that_is_drawn_whatever_was_drawn_before()
     let renderer = renderer();
     let time = "2000-02-15T12:00:00Z";
     let job = |manifest: &Manifest| {
-        let view = tile(2, 2, 1, 256);
+        let view = tile(2, 3, 1, 256);
         let style = crate::scenes::job(Mode::Map, view).style;
         RenderJob::of(
             manifest,
