@@ -248,6 +248,17 @@ async fn gaps_are_those_of_the_version_that_is_drawn_whatever_was_drawn_before()
             .collect::<Vec<u32>>()
     };
     let used = windows(&store, &renderer);
+    // What was filled in is known to be, and how badly.
+    let scene = used.scene(&before).await.unwrap();
+    let field = &scene.value.before;
+    let errors = field.errors.as_ref().unwrap().content();
+    assert!(field.has_uncertainty() && field.largest_error > 0.0);
+    let measured = errors.iter().filter(|error| **error <= 0.0).count();
+    let filled = errors
+        .iter()
+        .filter(|error| **error > 0.0 && error.is_finite())
+        .count();
+    assert!(measured > 1000 && filled > 10, "{measured} {filled}");
     let of_first = cells(&used, &before).await;
     let of_second = cells(&used, &now).await;
     assert_ne!(of_first, of_second);
