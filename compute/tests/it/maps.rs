@@ -390,8 +390,8 @@ async fn extremes_percentiles_and_counts_of_cells_are_those_of_places() {
     for one in &made {
         maps.push(read(&store, one, 0).await);
     }
-    // One with all steps, two with gaps; the last has one step of 36.
-    for (row, col) in [(4, 0), (11, 5), (7, 6)] {
+    // One with all steps, two with gaps, of which one has one step of 36; the last has each extreme twelve times.
+    for (row, col) in [(4, 0), (11, 5), (7, 6), (0, 0)] {
         let place = [f64::from(col) - 29.5, 39.5 - f64::from(row)];
         let right = of_place(&engine, place, &names.join(",")).await;
         let cell = at(row as usize, col as usize);
@@ -607,4 +607,53 @@ async fn just_as_much_as_is_asked_for_is_enough_and_anomalies_have_the_domain_of
     assert!(last[1].is_nan() && !read(&store, &made, 0).await[1].is_nan());
     let cells = domain::read(&store, &made.domain).await.unwrap();
     assert_eq!(cells[..3], [true, true, false]);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn chances_are_those_of_the_test_that_is_asked_for() {
+    let (_folder, store) = folder_store();
+    let value = |month: u32, cell: usize| {
+        let noise = (month * 7919 + 31 * cell as u32) % 101;
+        290.0 + month as f32 * 0.002 + noise as f32 * 0.01
+    };
+    let steps: Vec<(Period, Vec<f32>)> = (0..72)
+        .map(|month| {
+            let period = Period::month(2001 + (month / 12) as i32, month % 12 + 1).unwrap();
+            let cells = (0..GRID.cell_count()).map(|cell| value(month, cell));
+            (period, cells.collect())
+        })
+        .collect();
+    let sst = Quantity::SeaSurfaceTemperature;
+    land(&store, &product("wind"), sst, GRID, &steps).await;
+    let engine = Engine::in_process(store.clone(), parts(2));
+    let options = [
+        MapStatistic::TrendPValue,
+        MapStatistic::LeastSquaresTrendPValue,
+        MapStatistic::Trend,
+        MapStatistic::LeastSquaresTrend,
+    ];
+    let options = options.map(MapOptions::new);
+    let made = derive_statistics(&engine, &product("wind"), &options, &|_| ()).await;
+    let mut maps = vec![];
+    for one in &made.unwrap() {
+        maps.push(read(&store, one, 0).await);
+    }
+    let periods: Vec<Period> = steps.iter().map(|(period, _)| *period).collect();
+    for cell in [0, at(7, 9), at(18, 36)] {
+        let values = steps.iter().map(|(_, values)| f64::from(values[cell]));
+        let values: Vec<f64> = values.collect();
+        let right = trend_of_series(&periods, &values, TimeStep::Month, "").unwrap();
+        let line = &right.least_squares;
+        let right = [
+            right.mann_kendall.p_value,
+            line.p_value.unwrap(),
+            right.theil_sen.slope_per_decade / 10.0,
+            line.slope_per_decade / 10.0,
+        ];
+        assert!((right[0] - right[1]).abs() > 1e-3 && (right[2] - right[3]).abs() > 1e-5);
+        for (map, right) in maps.iter().zip(right) {
+            let own = f64::from(map[cell]);
+            assert!((own - right).abs() < 1e-6, "{cell}: {own} {right}");
+        }
+    }
 }
