@@ -252,7 +252,7 @@ async fn gaps_are_those_of_the_version_that_is_drawn_whatever_was_drawn_before()
     let scene = used.scene(&before).await.unwrap();
     let field = &scene.value.before;
     let errors = field.errors.as_ref().unwrap().content();
-    assert!(field.has_uncertainty() && field.largest_error > 0.0);
+    assert!(scene.value.has_uncertainty() && field.largest_error > 0.0);
     let measured = errors.iter().filter(|error| error.abs() < 1e-30).count();
     let filled = errors
         .iter()
