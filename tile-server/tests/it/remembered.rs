@@ -8,7 +8,7 @@ use crate::app::TestApp;
 /// An address, and what is to be changed in it: a part and what stands in its place.
 type Question = (&'static str, &'static [(&'static str, &'static str)]);
 
-const QUESTIONS: [Question; 7] = [
+const QUESTIONS: [Question; 8] = [
     (
         "sst/point?lon=10&lat=20&format=json",
         &[
@@ -44,6 +44,16 @@ const QUESTIONS: [Question; 7] = [
             ("json", "csv"),
             ("json", "arrow"),
             ("&format", "&ocean=mask&format"),
+        ],
+    ),
+    (
+        "sst/point?lon=10&lat=20&sampling=cell&statistic=mean&step=total",
+        &[
+            ("lon=10", "lon=20"),
+            // Of one place, which is called the same.
+            ("sampling=cell", "sampling=bilinear"),
+            ("mean", "max"),
+            ("total", "month"),
         ],
     ),
     (
