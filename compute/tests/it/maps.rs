@@ -639,21 +639,28 @@ async fn chances_are_those_of_the_test_that_is_asked_for() {
         maps.push(read(&store, one, 0).await);
     }
     let periods: Vec<Period> = steps.iter().map(|(period, _)| *period).collect();
-    for cell in [0, at(7, 9), at(18, 36)] {
+    let (mut compared, mut telling) = (0, 0);
+    for cell in (0..GRID.cell_count()).step_by(7) {
         let values = steps.iter().map(|(_, values)| f64::from(values[cell]));
         let values: Vec<f64> = values.collect();
         let right = trend_of_series(&periods, &values, TimeStep::Month, "").unwrap();
         let line = &right.least_squares;
+        let Some(of_line) = line.p_value else {
+            assert!(maps[1][cell].is_nan());
+            continue;
+        };
         let right = [
             right.mann_kendall.p_value,
-            line.p_value.unwrap(),
+            of_line,
             right.theil_sen.slope_per_decade / 10.0,
             line.slope_per_decade / 10.0,
         ];
-        assert!((right[0] - right[1]).abs() > 1e-3 && (right[2] - right[3]).abs() > 1e-5);
         for (map, right) in maps.iter().zip(right) {
             let own = f64::from(map[cell]);
             assert!((own - right).abs() < 1e-6, "{cell}: {own} {right}");
         }
+        compared += 1;
+        telling += u32::from((right[0] - right[1]).abs() > 1e-3);
     }
+    assert!(compared > 50 && telling > 10, "{compared} {telling}");
 }

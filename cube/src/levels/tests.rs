@@ -78,9 +78,11 @@ async fn levels_of_another_layout_are_not_read_and_made_anew() {
     let mut session = session.write().await;
     let group = path(LEVELS).unwrap();
     let node = session.get_group(&group).await.unwrap();
-    let text = String::from_utf8(node.user_data.to_vec()).unwrap();
-    let other = text.replace("\"layout\":1", "\"layout\":2");
-    assert_ne!(other, text);
+    let mut other: Value = serde_json::from_slice(&node.user_data).unwrap();
+    let layout = &mut other["attributes"][ATTRIBUTE]["layout"];
+    assert_eq!(*layout, LAYOUT);
+    *layout = (LAYOUT + 1).into();
+    let other = other.to_string().into_bytes();
     session.update_group(&group, other.into()).await.unwrap();
     session.commit("another layout").execute().await.unwrap();
     drop(session);
