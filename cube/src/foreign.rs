@@ -17,3 +17,6 @@ pub use array::{Absent, ArrayKind, ForeignArray};
 pub use error::ForeignError;
 pub use hierarchy::{Changed, Foreign, Found};
 pub use objects::{Objects, StoredObjects};
+
+#[cfg(test)]
+mod tests;

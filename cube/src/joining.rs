@@ -282,3 +282,48 @@ impl Joiner {
         joining.map_or_else(LevelRows::default, |own| std::mem::take(&mut own.done))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn units_tell_what_becomes_of_values() {
+        let of = |unit: &str| Method::of(Quantity::open("own", unit, "Own").unwrap());
+        for (unit, method) in [
+            ("degree", Method::Direction { turn: 360.0 }),
+            ("Degrees_True", Method::Direction { turn: 360.0 }),
+            (
+                "radian",
+                Method::Direction {
+                    turn: std::f64::consts::TAU,
+                },
+            ),
+            ("1", Method::Sample),
+            ("m s-1", Method::Mean),
+        ] {
+            assert_eq!(of(unit), method, "{unit}");
+        }
+        // A known quantity without a unit is a share, and has a mean.
+        assert_eq!(Method::of(Quantity::IceFraction), Method::Mean);
+    }
+
+    #[test]
+    fn what_holds_any_data_keeps_some_coverage_and_what_lacks_any_is_not_whole() {
+        let coverage = |share: f64| {
+            let mut block = Block::default();
+            block.take(&Block::of(1.0, share, Method::Mean), false);
+            block.coverage(1.0)
+        };
+        for (share, steps) in [
+            (0.0, 0),
+            (1e-6, 1),
+            (0.5, 128),
+            (1.0 - 1e-6, WHOLLY_COVERED - 1),
+            (1.0 - 1e-12, WHOLLY_COVERED),
+            (1.0, WHOLLY_COVERED),
+        ] {
+            assert_eq!(coverage(share), steps, "{share}");
+        }
+    }
+}

@@ -7,7 +7,7 @@ use bytes::Bytes;
 use futures::future::BoxFuture;
 use icechunk::Store as ZarrStore;
 use icechunk::format::{ByteRange, ChunkIndices, Path};
-use icechunk::session::Session;
+use icechunk::session::{Session, SessionErrorKind};
 use icechunk::store::StoreErrorKind;
 use serde_json::{Map, Value, json};
 use tokio::sync::RwLock;
@@ -89,11 +89,12 @@ impl Keys {
                 return Ok(whole.map(|whole| whole.len() as u64));
             };
             let session = self.session.read().await;
-            // An array that is not there, or has no such chunk.
-            let Ok(payload) = session.get_chunk_ref(&path, &index).await else {
-                return Ok(None);
-            };
-            Ok(payload.map(|payload| payload.length()))
+            match session.get_chunk_ref(&path, &index).await {
+                Ok(payload) => Ok(payload.map(|payload| payload.length())),
+                // Only what is not there is none: to who reads Zarr that is no data.
+                Err(e) if is_no_array(&e.kind) => Ok(None),
+                Err(e) => Err(CubeError::library(&self.place, "looking for a chunk", e)),
+            }
         })
     }
 
@@ -128,6 +129,14 @@ impl Keys {
             Err(e) => Err(CubeError::library(&self.place, "reading a key", e)),
         }
     }
+}
+
+/// Is there no array of this name?
+fn is_no_array(error: &SessionErrorKind) -> bool {
+    matches!(
+        error,
+        SessionErrorKind::NodeNotFound { .. } | SessionErrorKind::NotAnArray { .. }
+    )
 }
 
 /// Is there no such key, or none that could be?

@@ -304,3 +304,6 @@ pub(crate) fn with_levels(description: &Description) -> Map<String, Value> {
     attributes.insert("multiscales".to_owned(), multiscales);
     attributes
 }
+
+#[cfg(test)]
+mod tests;

@@ -174,6 +174,12 @@ mod tests {
         entering
     }
 
+    /// Is somebody sent away at once?
+    fn is_busy(gate: &FairGate, number: u8) -> bool {
+        let answer = gate.enter(client(number)).now_or_never();
+        matches!(answer, Some(Err(ServerError::Busy)))
+    }
+
     /// Lets those who wait in one after the other, and says in which order.
     fn order(mut first: Pass, mut all: Vec<(&'static str, Entering)>) -> Vec<&'static str> {
         let mut names = vec![];
@@ -221,15 +227,27 @@ mod tests {
         let gate = gate(4);
         let _first = gate.enter(client(1)).await.unwrap();
         let _own: Vec<Entering> = (0..2).map(|_| waiting(&gate, 1)).collect();
-        assert!(matches!(
-            gate.enter(client(1)).await,
-            Err(ServerError::Busy)
-        ));
+        assert!(is_busy(&gate, 1));
         let _others = [waiting(&gate, 2), waiting(&gate, 3)];
-        assert!(matches!(
-            gate.enter(client(4)).await,
-            Err(ServerError::Busy)
-        ));
+        assert!(is_busy(&gate, 4));
+    }
+
+    #[tokio::test]
+    async fn questions_that_nobody_waits_for_are_not_remembered() {
+        let gate = gate(4);
+        let first = gate.enter(client(1)).await.unwrap();
+        for _ in 0..100 {
+            drop(waiting(&gate, 2));
+        }
+        {
+            let state = gate.0.state();
+            let held: usize = state.questions.values().map(VecDeque::len).sum();
+            assert_eq!((held, state.order.len(), state.waiting), (1, 1, 0));
+        }
+        // And they take no place from those that come.
+        drop([waiting(&gate, 2), waiting(&gate, 2)]);
+        let all = [("own", waiting(&gate, 2)), ("other", waiting(&gate, 3))];
+        assert_eq!(order(first, all.into()), ["own", "other"]);
     }
 
     #[tokio::test]
@@ -238,10 +256,7 @@ mod tests {
         let first = gate.enter(client(1)).await.unwrap();
         let gone = waiting(&gate, 1);
         let stays = waiting(&gate, 2);
-        assert!(matches!(
-            gate.enter(client(3)).await,
-            Err(ServerError::Busy)
-        ));
+        assert!(is_busy(&gate, 3));
         drop(gone);
         let third = waiting(&gate, 3);
         // Let in, but gone before it looks.

@@ -49,6 +49,8 @@ mod recomputed;
 #[cfg(test)]
 mod regions;
 #[cfg(test)]
+mod remembered_sums;
+#[cfg(test)]
 mod sql;
 #[cfg(test)]
 mod statistics;

@@ -390,8 +390,8 @@ async fn extremes_percentiles_and_counts_of_cells_are_those_of_places() {
     for one in &made {
         maps.push(read(&store, one, 0).await);
     }
-    // One with all steps, two with gaps; the last has one step of 36.
-    for (row, col) in [(4, 0), (11, 5), (7, 6)] {
+    // One with all steps, two with gaps, of which one has one step of 36; the last has each extreme twelve times.
+    for (row, col) in [(4, 0), (11, 5), (7, 6), (0, 0)] {
         let place = [f64::from(col) - 29.5, 39.5 - f64::from(row)];
         let right = of_place(&engine, place, &names.join(",")).await;
         let cell = at(row as usize, col as usize);
@@ -568,4 +568,134 @@ async fn anomalies_have_the_same_bits_from_blocks_and_from_fields() {
             assert_eq!(made.steps[step].valid_cells, held as u64);
         }
     }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn statistics_of_different_periods_share_nothing_but_the_reading() {
+    let (_folder, store) = folder_store();
+    landed(&store).await;
+    let engine = Engine::in_process(store.clone(), parts(2));
+    let of = |statistic, from: &str, name: &str| MapOptions {
+        from: from.parse().ok(),
+        ..of(statistic, None, name)
+    };
+    let both = [
+        of(MapStatistic::Amplitude, "2001", "a"),
+        of(MapStatistic::Amplitude, "2002-06", "b"),
+        of(MapStatistic::Phase, "2001-09", "c"),
+    ];
+    let made = derive_statistics(&engine, &product("wind"), &both, &|_| ()).await;
+    for (made, (options, name)) in made.unwrap().iter().zip(both.iter().zip(["x", "y", "z"])) {
+        let alone = MapOptions {
+            name: Some(product(name)),
+            ..options.clone()
+        };
+        let alone = derived(&engine, &alone).await.unwrap();
+        assert_eq!(made.steps[0].period, alone.steps[0].period);
+        let (own, right) = (read(&store, made, 0).await, read(&store, &alone, 0).await);
+        assert!(
+            own.iter()
+                .zip(&right)
+                .all(|(a, b)| a.to_bits() == b.to_bits()),
+            "{name}"
+        );
+    }
+}
+
+/// Two years of which a cell has both, one, or none; and two Januaries of those years.
+#[tokio::test(flavor = "multi_thread")]
+async fn just_as_much_as_is_asked_for_is_enough_and_anomalies_have_the_domain_of_all_steps() {
+    let (_folder, store) = folder_store();
+    let engine = Engine::in_process(store.clone(), parts(2));
+    let values = |year: usize| -> Vec<f32> {
+        let value = |cell: usize| match cell % 3 {
+            0 => 5.0 + year as f32,
+            1 if year == 0 => 9.0,
+            _ => f32::NAN,
+        };
+        (0..GRID.cell_count()).map(value).collect()
+    };
+    let years = [0, 1].map(|year| (Period::year(2001 + year as i32).unwrap(), values(year)));
+    let months = [0, 1].map(|year| (Period::month(2001 + year as i32, 1).unwrap(), values(year)));
+    for (name, steps, statistic) in [
+        ("years", years, MapStatistic::Mean),
+        ("months", months, MapStatistic::Climatology),
+    ] {
+        land(&store, &product(name), Quantity::WindSpeed, GRID, &steps).await;
+        for (least_percent, is_enough) in [(50, true), (51, false)] {
+            let options = MapOptions {
+                least_percent,
+                name: Some(product(&format!("{name}-{least_percent}"))),
+                ..MapOptions::new(statistic)
+            };
+            let made = derive_statistic(&engine, &product(name), &options, &|_| ()).await;
+            let map = read(&store, &made.unwrap(), 0).await;
+            assert_eq!(map[0].to_bits(), 5.5f32.to_bits(), "{name}");
+            assert_eq!(map[1].is_nan(), !is_enough, "{name} {least_percent}");
+            assert!(map[2].is_nan());
+        }
+    }
+    let anomalies = MapOptions::new(MapStatistic::Anomaly);
+    let made = derive_statistic(&engine, &product("months"), &anomalies, &|_| ()).await;
+    let made = made.unwrap();
+    let last = read(&store, &made, 1).await;
+    assert!(last[1].is_nan() && !read(&store, &made, 0).await[1].is_nan());
+    let cells = domain::read(&store, &made.domain).await.unwrap();
+    assert_eq!(cells[..3], [true, true, false]);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn chances_are_those_of_the_test_that_is_asked_for() {
+    let (_folder, store) = folder_store();
+    let value = |month: u32, cell: usize| {
+        let noise = (month * 7919 + 31 * cell as u32) % 101;
+        290.0 + month as f32 * 0.002 + noise as f32 * 0.01
+    };
+    let steps: Vec<(Period, Vec<f32>)> = (0..72)
+        .map(|month| {
+            let period = Period::month(2001 + (month / 12) as i32, month % 12 + 1).unwrap();
+            let cells = (0..GRID.cell_count()).map(|cell| value(month, cell));
+            (period, cells.collect())
+        })
+        .collect();
+    let sst = Quantity::SeaSurfaceTemperature;
+    land(&store, &product("wind"), sst, GRID, &steps).await;
+    let engine = Engine::in_process(store.clone(), parts(2));
+    let options = [
+        MapStatistic::TrendPValue,
+        MapStatistic::LeastSquaresTrendPValue,
+        MapStatistic::Trend,
+        MapStatistic::LeastSquaresTrend,
+    ];
+    let options = options.map(MapOptions::new);
+    let made = derive_statistics(&engine, &product("wind"), &options, &|_| ()).await;
+    let mut maps = vec![];
+    for one in &made.unwrap() {
+        maps.push(read(&store, one, 0).await);
+    }
+    let periods: Vec<Period> = steps.iter().map(|(period, _)| *period).collect();
+    let (mut compared, mut telling) = (0, 0);
+    for cell in (0..GRID.cell_count()).step_by(7) {
+        let values = steps.iter().map(|(_, values)| f64::from(values[cell]));
+        let values: Vec<f64> = values.collect();
+        let right = trend_of_series(&periods, &values, TimeStep::Month, "").unwrap();
+        let line = &right.least_squares;
+        let Some(of_line) = line.p_value else {
+            assert!(maps[1][cell].is_nan());
+            continue;
+        };
+        let right = [
+            right.mann_kendall.p_value,
+            of_line,
+            right.theil_sen.slope_per_decade / 10.0,
+            line.slope_per_decade / 10.0,
+        ];
+        for (map, right) in maps.iter().zip(right) {
+            let own = f64::from(map[cell]);
+            assert!((own - right).abs() < 1e-6, "{cell}: {own} {right}");
+        }
+        compared += 1;
+        telling += u32::from((right[0] - right[1]).abs() > 1e-3);
+    }
+    assert!(compared > 50 && telling > 10, "{compared} {telling}");
 }

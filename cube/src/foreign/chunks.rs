@@ -10,6 +10,7 @@ use zarrs::array::{
     ArrayShardedExt as _, ArrayToBytesCodecTraits as _, AsyncArrayShardedReadableExt as _,
     CodecOptions,
 };
+use zarrs::storage::byte_range::ByteRange;
 
 use super::array::{Absent, ArrayKind, ForeignArray, Unpacked, number};
 use super::error::ForeignError;
@@ -180,7 +181,9 @@ async fn check_there(
         let range = range
             .await
             .map_err(|e| ForeignError::refused(&array.place, first_lines(&e)))?;
-        if range.is_none() {
+        // The library gives what the index has, where one that is not there has no place but all bits set.
+        let is_there = range.is_some_and(|it| !matches!(it, ByteRange::FromStart(u64::MAX, _)));
+        if !is_there {
             return Err(missing(&index));
         }
     }

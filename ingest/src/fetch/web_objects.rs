@@ -193,3 +193,15 @@ impl Objects for WebObjects {
         Ok(None)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parts_are_asked_for_with_both_ends_in_them() {
+        assert_eq!(header(&GetRange::Bounded(5..9)), "bytes=5-8");
+        assert_eq!(header(&GetRange::Offset(7)), "bytes=7-");
+        assert_eq!(header(&GetRange::Suffix(196)), "bytes=-196");
+    }
+}

@@ -245,3 +245,29 @@ fn cut(text: &str) -> String {
     }
     text[..end].to_owned()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn fill_values_that_json_cannot_hold_are_read_by_name_or_in_base_64() {
+        let float = Kind::Float(4);
+        let of = |name: &str, text: &str, kind| number_of_text(name, text, kind);
+        let packed = STANDARD.encode((-999.5_f64).to_le_bytes());
+        assert_eq!(of("_FillValue", &packed, float), Some(-999.5));
+        assert_eq!(
+            of("missing_value", "-Infinity", float),
+            Some(f64::NEG_INFINITY)
+        );
+        assert!(of("_FillValue", "NaN", float).unwrap().is_nan());
+        for (name, text, kind) in [
+            ("units", packed.as_str(), float),
+            ("_FillValue", packed.as_str(), Kind::Integer(2)),
+            ("_FillValue", "AAAA", float),
+            ("_FillValue", "no number", float),
+        ] {
+            assert_eq!(of(name, text, kind), None, "{name} {text}");
+        }
+    }
+}

@@ -64,11 +64,11 @@ impl Own {
         std::fs::write(path, document.to_string()).unwrap();
     }
 
-    fn request(&self) -> Request {
+    pub(crate) fn request(&self) -> Request {
         request(self.path().to_str().unwrap(), "sst")
     }
 
-    async fn attach(&self) -> Result<Attached, String> {
+    pub(crate) async fn attach(&self) -> Result<Attached, String> {
         self.ask(&self.request()).await
     }
 

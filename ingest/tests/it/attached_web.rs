@@ -60,6 +60,14 @@ async fn what_a_server_answers_wrong_is_refused() {
                 Answer::Whole("302 Found", vec![location], vec![])
             }
             ("half", Some(content)) if is_chunk => Answer::Half(content),
+            // Nothing says beforehand how long it is.
+            ("endless", Some(_)) if name == "zarr.json" => {
+                let spaces = vec![b' '; 17 << 20];
+                let mut body = format!("{:x}\r\n", spaces.len()).into_bytes();
+                body.extend([&spaces[..], b"\r\n0\r\n\r\n"].concat());
+                let chunked = vec!["transfer-encoding: chunked".to_owned()];
+                Answer::Whole("200 OK", chunked, body)
+            }
             ("huge", Some(content)) if name == "zarr.json" => {
                 let mut content = content;
                 content.resize(17 << 20, b' ');
@@ -77,6 +85,7 @@ async fn what_a_server_answers_wrong_is_refused() {
             "leads to 169.254.169.254, which is no address of the public network",
         ),
         ("huge", "17825792 bytes, at most 16777216 are read"),
+        ("endless", "at most 16777216 are read"),
         ("half", "sst/c/0/0/0"),
     ] {
         let address = format!("http://{}/{way}", server.address);

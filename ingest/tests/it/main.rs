@@ -4,6 +4,8 @@
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod attached;
+mod attached_again;
+mod attached_shards;
 mod attached_web;
 mod attributes;
 mod axes;

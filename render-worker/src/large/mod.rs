@@ -353,3 +353,33 @@ fn check_size(job: &RenderJob, choice: &Choice) -> Result<(), DrawError> {
         ),
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use render_proof::{ocean, views};
+
+    use super::*;
+
+    #[test]
+    fn a_window_of_more_cells_than_are_held_is_refused() {
+        let job = ocean::job(views::tile(0, 0, 0, 256));
+        let of = |rows: u32| {
+            let grid = Grid {
+                rows,
+                cols: 1 << 14,
+                ..job.grid
+            };
+            let choice = Choice {
+                level: 0,
+                cells: [1; 2],
+                whole: grid,
+                corner: [0; 2],
+                window: grid,
+            };
+            check_size(&job, &choice).map_err(|e| e.in_full())
+        };
+        assert!(of(1 << 13).is_ok());
+        let refused = of((1 << 13) + 1).unwrap_err();
+        assert!(refused.contains("134217728 at most are held"), "{refused}");
+    }
+}

@@ -16,7 +16,7 @@ use crate::stored::product;
 
 /// Steps of a power of two, so that places are the same numbers in any window; from the meridian of Greenwich on, so that tiles cross
 /// the edge of the grid.
-const GRID: Grid = Grid {
+pub(crate) const GRID: Grid = Grid {
     rows: 1440,
     cols: 2880,
     north_deg: 90.0,
@@ -25,10 +25,10 @@ const GRID: Grid = Grid {
     dlon_deg: 0.125,
 };
 /// Fewer cells than it has.
-const LIMIT: u64 = 100_000;
+pub(crate) const LIMIT: u64 = 100_000;
 
 /// Values of a month: smooth, with land, and in one month with a cloud.
-fn values(scale: f32, month: usize, has_cloud: bool) -> Vec<f32> {
+pub(crate) fn values(scale: f32, month: usize, has_cloud: bool) -> Vec<f32> {
     let value = |cell: usize| {
         let (row, col) = (cell / 2880, cell % 2880);
         let is_land = (600..900).contains(&col) && (200..1100).contains(&row) || row > 1300;

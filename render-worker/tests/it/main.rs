@@ -16,6 +16,7 @@ mod gallery;
 mod here;
 mod incomplete;
 mod large;
+mod large_scenes;
 mod loading;
 mod lost_device;
 mod parts;

@@ -240,6 +240,12 @@ impl TestApp {
         manifest.id()
     }
 
+    /// The number of the newest version of a product.
+    pub(crate) async fn newest_number(&self, product: &str) -> u64 {
+        let newest = manifests::latest(&self.store, &product.parse().unwrap()).await;
+        newest.unwrap().unwrap().number
+    }
+
     /// What the newest version of a product is made of at an instant.
     pub(crate) async fn time_sample(&self, product: &str, time: &str) -> TimeSample {
         let newest = manifests::latest(&self.store, &product.parse().unwrap()).await;

@@ -31,6 +31,7 @@ mod point;
 mod products;
 mod properties;
 mod regions;
+mod remembered;
 mod remote_store;
 mod schema;
 mod serve;

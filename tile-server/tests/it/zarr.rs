@@ -1,10 +1,18 @@
 //! Products by keys of Zarr: as they lie in the store, each version for itself, whole or in parts.
 
-use axum::http::{StatusCode, header};
-use contract::quantity::Quantity;
-use serde_json::Value;
+use std::sync::Arc;
 
-use crate::app::TestApp;
+use async_trait::async_trait;
+use axum::http::{StatusCode, header};
+use contract::digest::Digest;
+use contract::manifest::{MANIFEST_SCHEMA, Manifest, Step};
+use contract::quantity::Quantity;
+use contract::time::Period;
+use serde_json::Value;
+use storage::attached::{Attachment, Failure, Reference, Source, StoreKind};
+use storage::{Store, domain, fields, manifests};
+
+use crate::app::{GRID, TestApp};
 
 #[tokio::test]
 async fn the_group_describes_all_arrays_and_their_chunks_are_there() {
@@ -106,6 +114,21 @@ async fn parts_are_those_of_the_whole_and_copies_are_known_again() {
         (again.status, again.body.len()),
         (StatusCode::NOT_MODIFIED, 0)
     );
+    // Who has a part of it wants the rest, or all of what came since.
+    for (tag, status) in [
+        (tag, StatusCode::PARTIAL_CONTENT),
+        ("\"another\"", StatusCode::OK),
+    ] {
+        let headers = [("range", "bytes=5-"), ("if-range", tag)];
+        let answer = app.get_with(path, &headers).await;
+        assert_eq!(answer.status, status, "{tag}");
+        let start = if status == StatusCode::OK { 0 } else { 5 };
+        assert_eq!(answer.body, whole.body[start..], "{tag}");
+    }
+    // Nobody has a right copy of what is not there.
+    let nothing = path.replace("carbon_flux", "nothing");
+    let nothing = app.get_with(&nothing, &[("if-none-match", tag)]).await;
+    assert_eq!(nothing.status, StatusCode::NOT_FOUND);
     let cached = |answer: &crate::app::Answer| answer.headers[header::CACHE_CONTROL].clone();
     assert!(cached(&whole).to_str().unwrap().contains("immutable"));
     assert!(!cached(&metadata).to_str().unwrap().contains("immutable"));
@@ -125,4 +148,103 @@ async fn a_version_stays_what_it_is_and_the_newest_becomes_another() {
     let digest = id.to_string();
     let digest = digest.strip_prefix("flux").unwrap();
     assert_eq!(app.get(&path(digest)).await.body, second.body);
+}
+
+/// A store of others that nobody needs to read.
+#[derive(Debug)]
+struct Theirs;
+
+#[async_trait]
+impl Source for Theirs {
+    async fn values(
+        &self,
+        _attachment: &Arc<Attachment>,
+        _reference: &Reference,
+    ) -> Result<Vec<f32>, Failure> {
+        Ok(vec![290.0; GRID.cell_count()])
+    }
+}
+
+/// Publishes a product whose one step lies in a store of others.
+async fn attached(store: &Store, product: &str, place: &str) {
+    let (product, period) = (product.parse().unwrap(), Period::month(2000, 1).unwrap());
+    let values = vec![290.0; GRID.cell_count()];
+    let there = (place.to_owned(), StoreKind::Zarr3, None);
+    let attachment = Attachment::new(product, there, "sst".to_owned(), Value::Null);
+    let name = store.put_attachment(&attachment).await.unwrap();
+    let shape = [GRID.rows, GRID.cols];
+    let reference = Reference::new(name, (0, period), shape, [1.0, 0.0]);
+    let digest: Digest = fields::digest_of(&GRID, &values, period);
+    let product = attachment.product;
+    let field = store.put_reference(&product, &digest, &reference).await;
+    let known = vec![true; GRID.cell_count()];
+    let manifest = Manifest {
+        schema: MANIFEST_SCHEMA,
+        number: 1,
+        title: "Theirs".to_owned(),
+        quantity: Quantity::SeaSurfaceTemperature,
+        synthetic: false,
+        source: "Others".to_owned(),
+        grid: GRID,
+        steps: vec![Step {
+            masked: None,
+            period,
+            field: field.unwrap(),
+            raw_sha256: name,
+            origin: place.to_owned(),
+            valid_cells: GRID.cell_count() as u64,
+            contributed: None,
+        }],
+        domain: domain::write(store, &product, &known).await.unwrap(),
+        series: vec![],
+        derived_from: None,
+        computed: None,
+        notices: vec![],
+        product,
+    };
+    manifests::commit(store, &manifest).await.unwrap();
+}
+
+#[tokio::test]
+async fn of_an_attached_product_it_is_told_where_it_lies_unless_that_is_a_folder() {
+    let store = Store::memory().with_attached(Arc::new(Theirs));
+    attached(&store, "open", "s3://theirs/sst.zarr").await;
+    attached(&store, "closed", "/srv/secret/sst.zarr").await;
+    let app = TestApp::over(store, |_settings| {});
+    for name in ["open", "open@1"] {
+        let answer = app.get(&format!("/zarr/{name}/zarr.json")).await;
+        assert_eq!(answer.status, StatusCode::NOT_FOUND, "{name}");
+        assert!(
+            answer.reason().contains("s3://theirs/sst.zarr"),
+            "{}",
+            answer.reason()
+        );
+    }
+    let answer = app.get("/zarr/closed/zarr.json").await;
+    assert_eq!(answer.status, StatusCode::NOT_FOUND);
+    let reason = answer.reason();
+    assert!(
+        reason.contains("not given out") && !reason.contains("secret"),
+        "{reason}"
+    );
+}
+
+#[tokio::test]
+async fn a_cube_that_was_made_again_is_opened_again() {
+    let app = TestApp::new().await;
+    let path = "/zarr/flux@1/carbon_flux/c/0/0/0";
+    // Opened, and nothing of it read.
+    let before = app.get("/zarr/flux@1/zarr.json").await;
+    assert_eq!(before.status, StatusCode::OK);
+    let newest = manifests::latest(&app.store, &"flux".parse().unwrap()).await;
+    let newest = newest.unwrap().unwrap();
+    for key in app.store.list("cubes/flux").await.unwrap() {
+        app.store.remove(&key).await.unwrap();
+    }
+    let failed = app.get(path).await;
+    assert_eq!(failed.status, StatusCode::INTERNAL_SERVER_ERROR);
+    cube::keep_up(&app.store, &newest).await;
+    let answer = app.get(path).await;
+    assert_eq!(answer.status, StatusCode::OK, "{}", answer.text());
+    assert_ne!(answer.headers[header::ETAG], before.headers[header::ETAG]);
 }

@@ -68,6 +68,8 @@ mod tests {
             ("time: point", Some(TimeMethod::Point)),
             ("area: mean time: point", Some(TimeMethod::Point)),
             ("area: time: mean", Some(TimeMethod::Interval)),
+            ("time: area: mean", Some(TimeMethod::Interval)),
+            ("time: lat: lon: point", Some(TimeMethod::Point)),
             (
                 "time: mean (interval: 1 hour comment: time: point)",
                 Some(TimeMethod::Interval),

@@ -379,6 +379,16 @@ mod tests {
         assert_eq!(packing.value(-6.0), 125.0);
         assert_eq!(packing.value(100.0), 50.0);
         assert!(packing.value(-1.0).is_nan() && packing.value(-5.0).is_nan());
+        // Some write the fill value as it is meant, and some as it is stored.
+        for fill in [255.0, -1.0] {
+            let fill = [("_FillValue", Kind::Integer(2), &[fill][..])];
+            let mut numbers = variable(byte, &fill);
+            let text = AttributeValue::Text("true".to_owned());
+            numbers.attributes.0.insert("_Unsigned".to_owned(), text);
+            let packing = Packing::of(&numbers);
+            assert!(packing.value(-1.0).is_nan());
+            assert_eq!(packing.value(-2.0), 254.0);
+        }
     }
 
     #[test]
