@@ -78,7 +78,8 @@ impl<'a> Reduction<'a> {
                         step: it.step - steps.start,
                         ranges: it.ranges.clone(),
                     });
-                    self.own_targets = (steps, own.collect());
+                    let own = own.collect();
+                    self.own_targets = (steps, own);
                 }
                 let own = &self.own_targets.1;
                 let added = add_weights(values, cells, own, ranges, &mut self.all.histograms);
