@@ -2339,6 +2339,15 @@ export interface operations {
                     "application/json": components["schemas"]["Refusal"];
                 };
             };
+            /** @description A store of others, to which the product is attached, does not hold what it held */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
             /** @description Too much to do, or a part that is needed does not answer */
             503: {
                 headers: {
@@ -2621,6 +2630,15 @@ export interface operations {
                     "application/json": components["schemas"]["Refusal"];
                 };
             };
+            /** @description A store of others, to which the product is attached, does not hold what it held */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
             /** @description Too much to do, or a part that is needed does not answer */
             503: {
                 headers: {
@@ -2735,6 +2753,15 @@ export interface operations {
             };
             /** @description A defect of this server */
             500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description A store of others, to which the product is attached, does not hold what it held */
+            502: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -2864,6 +2891,15 @@ export interface operations {
                     "application/json": components["schemas"]["Refusal"];
                 };
             };
+            /** @description A store of others, to which the product is attached, does not hold what it held */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
             /** @description Too much to do, or a part that is needed does not answer */
             503: {
                 headers: {
@@ -2986,6 +3022,15 @@ export interface operations {
                     "application/json": components["schemas"]["Refusal"];
                 };
             };
+            /** @description A store of others, to which the product is attached, does not hold what it held */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
             /** @description Too much to do, or a part that is needed does not answer */
             503: {
                 headers: {
@@ -3076,6 +3121,15 @@ export interface operations {
             };
             /** @description A defect of this server */
             500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description A store of others, to which the product is attached, does not hold what it held */
+            502: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -3174,6 +3228,15 @@ export interface operations {
                     "application/json": components["schemas"]["Refusal"];
                 };
             };
+            /** @description A store of others, to which the product is attached, does not hold what it held */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
             /** @description Too much to do, or a part that is needed does not answer */
             503: {
                 headers: {
@@ -3259,6 +3322,15 @@ export interface operations {
             };
             /** @description A defect of this server */
             500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description A store of others, to which the product is attached, does not hold what it held */
+            502: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -3384,6 +3456,15 @@ export interface operations {
                     "application/json": components["schemas"]["Refusal"];
                 };
             };
+            /** @description A store of others, to which the product is attached, does not hold what it held */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
             /** @description Too much to do, or a part that is needed does not answer */
             503: {
                 headers: {
@@ -3473,6 +3554,15 @@ export interface operations {
             };
             /** @description A defect of this server */
             500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description A store of others, to which the product is attached, does not hold what it held */
+            502: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -3586,6 +3676,15 @@ export interface operations {
             };
             /** @description A defect of this server */
             500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description A store of others, to which the product is attached, does not hold what it held */
+            502: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -3874,6 +3973,15 @@ export interface operations {
             };
             /** @description A defect of this server */
             500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description A store of others, to which the product is attached, does not hold what it held */
+            502: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -4230,6 +4338,15 @@ export interface operations {
                     "application/json": components["schemas"]["Refusal"];
                 };
             };
+            /** @description A store of others, to which the product is attached, does not hold what it held */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
             /** @description Too much to do, or a part that is needed does not answer */
             503: {
                 headers: {
@@ -4407,6 +4524,15 @@ export interface operations {
                     "application/json": components["schemas"]["Refusal"];
                 };
             };
+            /** @description A store of others, to which the product is attached, does not hold what it held */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
             /** @description Too much to do, or a part that is needed does not answer */
             503: {
                 headers: {
@@ -4499,6 +4625,15 @@ export interface operations {
             };
             /** @description A defect of this server */
             500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description A store of others, to which the product is attached, does not hold what it held */
+            502: {
                 headers: {
                     [name: string]: unknown;
                 };
