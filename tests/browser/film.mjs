@@ -53,7 +53,9 @@ export class Film {
   async read(pictures, measure, others = []) {
     const all = [];
     for (const picture of pictures) {
+      // The page that reads would complain of an address that is none.
       const [source, texts] = [measure.toString(), [picture, ...others]];
+      if (!texts.every(Boolean)) throw new Error("there is no picture yet");
       all.push(await this.#reader.evaluate(readPictures, { source, texts }));
     }
     return all;
