@@ -621,7 +621,7 @@ async fn who_has_an_answer_already_is_not_sent_it_again() {
     let point = "/api/products/sst/point?lon=0&lat=0";
     for address in [
         point,
-        "/api/regions",
+        "/api/products/flux/area?region=global",
         "/api/products/flux/budget?region=global",
     ] {
         let first = app.get(address).await;
