@@ -4,7 +4,7 @@
 
 use axum::body::{Body, HttpBody as _, to_bytes};
 use axum::extract::Request;
-use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
+use axum::http::{HeaderMap, HeaderValue, Method, StatusCode, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse as _, Response};
 use contract::digest::Digest;
@@ -17,17 +17,21 @@ const MOST_BYTES: u64 = 64 << 20;
 
 /// Gives a tag to each answer that has none and is to be asked for again every time.
 pub(crate) async fn tagged(request: Request, next: Next) -> Result<Response, ServerError> {
+    // What HEAD is answered with has no bytes to make a tag of, or none of GET's.
+    if request.method() != Method::GET {
+        return Ok(next.run(request).await);
+    }
     let asked: HeaderMap = request.headers().clone();
     let answer = next.run(request).await;
     let is_to_be_asked_again = answer
         .headers()
         .get(header::CACHE_CONTROL)
         .is_some_and(|value| value == "no-cache");
-    let is_there = answer.body().size_hint().exact();
+    let length_bytes = answer.body().size_hint().exact();
     if answer.status() != StatusCode::OK
         || !is_to_be_asked_again
         || answer.headers().contains_key(header::ETAG)
-        || is_there.is_none_or(|bytes| bytes > MOST_BYTES)
+        || length_bytes.is_none_or(|bytes| bytes > MOST_BYTES)
     {
         return Ok(answer);
     }
