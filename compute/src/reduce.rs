@@ -14,6 +14,7 @@ mod kernel;
 mod order;
 mod over_steps;
 mod percentiles;
+mod piece_queue;
 mod question;
 mod reduction;
 mod region_sums;

@@ -18,7 +18,9 @@ use crate::record::RECORD_BYTES;
 use crate::{CubeError, Description, Layout, cf};
 
 /// Group of the time-major copy.
-pub(crate) const SERIES: &str = "series";
+pub(crate) const SERIES: &str = "along_time";
+/// Group of the copy that programs of before made, which nobody reads: a chunk had the steps of one cell side by side.
+pub(crate) const SERIES_OF_BEFORE: &str = "series";
 /// Group of sums of blocks.
 pub(crate) const SUMS: &str = "sums";
 /// Group of coarser levels.
@@ -69,7 +71,8 @@ pub(crate) fn values(description: &Description, steps: u64) -> Result<Definition
     )
 }
 
-/// The time-major copy of the values, `[lat, lon, time]` of runs: shards of blocks of cells.
+/// The time-major copy of the values, `[time, lat, lon]` of runs: shards of blocks of cells. In a block the cells of a step lie side by
+/// side, where values are alike and gaps are whole: it decodes in a third of the time that it would take with the steps of a cell side by side.
 pub(crate) fn series(description: &Description, runs: usize) -> Result<Definition, CubeError> {
     let (grid, [rows, cols]) = (
         &description.grid,
@@ -78,10 +81,10 @@ pub(crate) fn series(description: &Description, runs: usize) -> Result<Definitio
     let run = RUN_STEPS as u64;
     let shape = Shape {
         name: format!("{SERIES}/{}", cf::variable(description.quantity)),
-        cells: vec![grid.rows.into(), grid.cols.into(), runs as u64 * run],
-        chunk: vec![rows.into(), cols.into(), run],
+        cells: vec![runs as u64 * run, grid.rows.into(), grid.cols.into()],
+        chunk: vec![run, rows.into(), cols.into()],
         zstd_level: QUICK_ZSTD_LEVEL,
-        dimensions: &["lat", "lon", "series_time"],
+        dimensions: &["series_time", "lat", "lon"],
     };
     let block = u64::from(BLOCK_CELLS);
     define(
@@ -89,7 +92,7 @@ pub(crate) fn series(description: &Description, runs: usize) -> Result<Definitio
         float32(),
         f32::NAN.into(),
         cf::of_series(description),
-        Some(vec![block, block, run]),
+        Some(vec![run, block, block]),
     )
 }
 

@@ -152,12 +152,13 @@ where
     S: AsyncReadableStorageTraits + 'static,
 {
     let axis = arrays::axis(description.quantity, 1)?;
-    let bounds: Vec<i64> = read_array(store, &axis.bounds, place).await?;
+    let bounds: Vec<i64> = read_array(store, &axis.bounds, place, None).await?;
     let starts: Vec<i64> = match &axis.step_start {
-        Some(step_start) => read_array(store, step_start, place).await?,
+        // Sums may begin with 1970.
+        Some(step_start) => read_array(store, step_start, place, Some(0)).await?,
         None => bounds.iter().copied().step_by(2).collect(),
     };
-    let digests: Vec<u8> = read_array(store, &axis.digests, place).await?;
+    let digests: Vec<u8> = read_array(store, &axis.digests, place, None).await?;
     let foreign = |reason: String| CubeError::Foreign {
         place: place.to_owned(),
         array: "time".to_owned(),
@@ -188,14 +189,16 @@ where
     Ok(steps)
 }
 
+/// Numbers of an array along time; `blank` is what a chunk holds that is not stored, none if every chunk must be.
 pub(crate) async fn read_array<S, T>(
     store: &Arc<S>,
     definition: &Definition,
     place: &str,
+    blank: Option<T>,
 ) -> Result<Vec<T>, CubeError>
 where
     S: AsyncReadableStorageTraits + 'static,
-    T: ElementOwned + Send + Sync,
+    T: ElementOwned + Copy + Send + Sync,
 {
     let array = open(store, definition, place).await?;
     let steps = array.shape()[0];
@@ -212,30 +215,43 @@ where
         .map(|chunk| read_chunk::<S, T>(&array, chunk).boxed())
         .buffered(CHUNKS_AT_ONCE);
     let mut all = vec![];
-    while let Some(mut numbers) = chunks.try_next().await? {
-        all.append(&mut numbers);
+    let mut chunk = 0;
+    while let Some(found) = chunks.try_next().await? {
+        let numbers = match (found, blank) {
+            (Some(numbers), _) => numbers,
+            (None, Some(blank)) => vec![blank; (chunk_steps * a_step) as usize],
+            (None, None) => return Err(unread(&array, chunk, "it is not there".to_owned())),
+        };
+        all.extend(numbers);
+        chunk += 1;
     }
     all.truncate((steps * a_step) as usize);
     Ok(all)
 }
 
-/// Reads a chunk along time as a whole, for then its checksum is compared.
-async fn read_chunk<S, T>(array: &Array<S>, chunk: u64) -> Result<Vec<T>, CubeError>
+fn chunk_index<S: ?Sized>(array: &Array<S>, chunk: u64) -> Vec<u64> {
+    let mut index = vec![0; array.dimensionality()];
+    index[0] = chunk;
+    index
+}
+
+fn unread<S: ?Sized>(array: &Array<S>, chunk: u64, reason: String) -> CubeError {
+    CubeError::Chunk {
+        array: arrays::name(array),
+        chunk: chunk_index(array, chunk),
+        reason,
+    }
+}
+
+/// Reads a chunk along time as a whole, for then its checksum is compared; none if the array has none there.
+async fn read_chunk<S, T>(array: &Array<S>, chunk: u64) -> Result<Option<Vec<T>>, CubeError>
 where
     S: AsyncReadableStorageTraits + 'static,
     T: ElementOwned + Send + Sync,
 {
-    let mut index = vec![0; array.dimensionality()];
-    index[0] = chunk;
+    let index = chunk_index(array, chunk);
     let found = array.async_retrieve_chunk_if_exists::<Vec<T>>(&index).await;
-    let damaged = |reason: String| CubeError::Chunk {
-        array: arrays::name(array),
-        chunk: index.clone(),
-        reason,
-    };
-    found
-        .map_err(|e| damaged(first_lines(&e)))?
-        .ok_or_else(|| damaged("it is not there".to_owned()))
+    found.map_err(|e| unread(array, chunk, first_lines(&e)))
 }
 
 /// Opens an array that must be what it is defined to be.

@@ -4,12 +4,14 @@
 //! The library's reader of shards holds every index that it ever saw, and reads one at a time; a region of a large grid
 //! touches thousands of them.
 
+use std::cell::Cell;
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
 
 use bytes::Bytes;
 use futures::stream::{self, StreamExt as _, TryStreamExt as _};
+use glam::{Mat4, Vec4};
 use icechunk::format::manifest::ChunkPayload;
 use icechunk::format::{ChunkIndices, Path};
 use quick_cache::Weighter;
@@ -63,9 +65,33 @@ impl Weighter<[u64; 3], Arc<Index>> for IndexWeight {
     }
 }
 
+/// Which of an array's axes goes along runs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum RunAxis {
+    /// That of values along time.
+    First,
+    /// That of records of sums.
+    Last,
+}
+
+impl RunAxis {
+    /// Where a shard or a block of a run lies among those of its array.
+    pub(crate) fn index(self, [row, col]: [u32; 2], run: usize) -> [u32; 3] {
+        match self {
+            Self::First => [run as u32, row, col],
+            Self::Last => [row, col, run as u32],
+        }
+    }
+
+    fn key(self, at: [u32; 2], run: usize) -> [u64; 3] {
+        self.index(at, run).map(u64::from)
+    }
+}
+
 /// Reads blocks of one state of a cube.
 pub(crate) struct Blocks {
     array: Array<AsyncIcechunkStore>,
+    axis: RunAxis,
     /// Rows and columns of blocks in a shard.
     shard: [u32; 2],
     indexes: Cache<[u64; 3], Arc<Index>, IndexWeight>,
@@ -78,7 +104,7 @@ pub(crate) struct Blocks {
 
 impl Blocks {
     pub(crate) fn new(
-        array: Array<AsyncIcechunkStore>,
+        (array, axis): (Array<AsyncIcechunkStore>, RunAxis),
         description: &Description,
         objects: &ObjectStorage,
     ) -> Result<Self, CubeError> {
@@ -91,6 +117,7 @@ impl Blocks {
         let index_bytes = entries * size_of::<[u32; 2]>() as u64;
         Ok(Self {
             array,
+            axis,
             path,
             objects: objects.clone(),
             shard,
@@ -129,7 +156,7 @@ impl Blocks {
         }
         let mut found = StoredChunks::default();
         for (shard, numbers) in by_shard {
-            let key = [shard[0].into(), shard[1].into(), run as u64];
+            let key = self.axis.key(shard, run);
             match self.parts_with(key, &numbers, blocks).await {
                 Ok(parts) => found.0.extend(parts),
                 Err(reason) => return Err(self.object(key).unreadable(key, &reason).await),
@@ -210,19 +237,20 @@ impl Blocks {
     /// The error of a block that cannot be decoded.
     pub(crate) async fn undecoded(&self, run: usize, block: [u32; 2], reason: &str) -> CubeError {
         let shard = [block[0] / self.shard[0], block[1] / self.shard[1]];
-        let key = [shard[0].into(), shard[1].into(), run as u64];
-        let chunk = [block[0].into(), block[1].into(), run as u64];
-        self.object(key).unreadable(chunk, reason).await
+        let chunk = self.axis.key(block, run);
+        self.object(self.axis.key(shard, run))
+            .unreadable(chunk, reason)
+            .await
     }
 
-    /// A whole shard, `[row, col, step]` of values, or `[row, col, byte]` of records; none where no cell has data. The library compares the checksum of a
+    /// A whole shard, `[step, row, col]` of values, or `[row, col, byte]` of records; none where no cell has data. The library compares the checksum of a
     /// block where it decodes all of it.
     pub(crate) async fn shard<T: ElementOwned>(
         &self,
         run: usize,
         shard: [u32; 2],
     ) -> Result<Option<Vec<T>>, CubeError> {
-        let index = [shard[0].into(), shard[1].into(), run as u64];
+        let index = self.axis.key(shard, run);
         let found = self.array.async_retrieve_chunk_if_exists(&index).await;
         match found {
             Ok(values) => Ok(values),
@@ -282,30 +310,84 @@ impl ChunkDecoder {
     }
 }
 
-/// Decodes one block of values after the other.
+/// Cells in a row of a block.
+const ROW: usize = BLOCK_CELLS as usize;
+
+/// Decodes one block of values after the other, and turns them along time.
 pub(crate) struct BlockDecoder {
     chunks: ChunkDecoder,
+    /// `[step, cell]`, as they are stored.
+    stored: Vec<f32>,
+    /// `[cell, step]`.
     values: Vec<f32>,
 }
 
+thread_local! {
+    /// The decoder of this thread: to make one takes as long as to decode ten blocks.
+    static OF_THREAD: Cell<Option<Box<BlockDecoder>>> = const { Cell::new(None) };
+}
+
+/// Works with the decoder of this thread.
+///
+/// # Errors
+/// There is no memory for one.
+pub(crate) fn with_decoder<R>(work: impl FnOnce(&mut BlockDecoder) -> R) -> Result<R, String> {
+    let mut own = match OF_THREAD.take() {
+        Some(own) => own,
+        None => Box::new(BlockDecoder::new()?),
+    };
+    let done = work(&mut own);
+    OF_THREAD.set(Some(own));
+    Ok(done)
+}
+
 impl BlockDecoder {
-    pub(crate) fn new() -> Result<Self, String> {
+    fn new() -> Result<Self, String> {
         Ok(Self {
             chunks: ChunkDecoder::new()?,
+            stored: vec![f32::NAN; BLOCK_VALUES],
             values: vec![f32::NAN; BLOCK_VALUES],
         })
     }
 
-    /// Values of a block, `[cell, step]`.
-    pub(crate) fn decode(&mut self, content: &[u8]) -> Result<&[f32], String> {
-        let bytes = bytemuck::cast_slice_mut(&mut self.values);
+    /// Decodes chunks of any kind.
+    pub(crate) fn chunks(&mut self) -> &mut ChunkDecoder {
+        &mut self.chunks
+    }
+
+    /// Values of a block, `[cell, step]`, of those of its rows of cells that are wanted: a bit each, the northernmost lowest. Of others the values are any.
+    pub(crate) fn decode(&mut self, content: &[u8], rows: u8) -> Result<&[f32], String> {
+        let bytes = bytemuck::cast_slice_mut(&mut self.stored);
         self.chunks.decode(content, bytes)?;
         if cfg!(target_endian = "big") {
-            for value in &mut self.values {
+            for value in &mut self.stored {
                 *value = f32::from_bits(u32::from_le(value.to_bits()));
             }
         }
+        for (row, values) in self.values.chunks_exact_mut(ROW * RUN_STEPS).enumerate() {
+            if rows >> row & 1 == 1 {
+                turn_row(&self.stored[row * ROW..], values);
+            }
+        }
         Ok(&self.values)
+    }
+}
+
+/// Side of the squares of values that are turned at a time.
+const SIDE: usize = 4;
+
+/// Turns a row of cells, `[step, cell]` of a whole block from its first cell on, to `[cell, step]`: matrices of four steps of four cells,
+/// whose bits stay what they are.
+fn turn_row(stored: &[f32], values: &mut [f32]) {
+    for left in (0..ROW).step_by(SIDE) {
+        for first in (0..RUN_STEPS).step_by(SIDE) {
+            let step = |step: usize| Vec4::from_slice(&stored[(first + step) * ROW * ROW + left..]);
+            let turned = Mat4::from_cols(step(0), step(1), step(2), step(3)).transpose();
+            let cells = [turned.x_axis, turned.y_axis, turned.z_axis, turned.w_axis];
+            for (cell, own) in cells.into_iter().enumerate() {
+                own.write_to_slice(&mut values[(left + cell) * RUN_STEPS + first..]);
+            }
+        }
     }
 }
 
@@ -351,16 +433,25 @@ mod tests {
         };
         let mut decoder = BlockDecoder::new().unwrap();
         let values: Vec<f32> = (0..BLOCK_VALUES).map(|at| at as f32).collect();
-        assert_eq!(decoder.decode(&stored(&values)).unwrap(), values);
-        let less = decoder.decode(&stored(&values[1..])).unwrap_err();
+        let of_row = ROW * RUN_STEPS;
+        let turned = |at: usize| values[at % RUN_STEPS * ROW * ROW + at / RUN_STEPS];
+        let turned: Vec<f32> = (0..BLOCK_VALUES).map(turned).collect();
+        // Rows that are not wanted keep what they were.
+        let found = decoder.decode(&stored(&values), 0b1000_0001).unwrap();
+        assert_eq!(found[..of_row], turned[..of_row]);
+        assert_eq!(found[7 * of_row..], turned[7 * of_row..]);
+        assert!(found[of_row..7 * of_row].iter().all(|value| value.is_nan()));
+        let mut decode = |content: &[u8]| decoder.decode(content, u8::MAX).map(<[f32]>::to_vec);
+        assert_eq!(decode(&stored(&values)).unwrap(), turned);
+        let less = decode(&stored(&values[1..])).unwrap_err();
         assert!(less.contains("less than a chunk"), "{less}");
         let more = [&values[..], &[1.0]].concat();
-        assert!(decoder.decode(&stored(&more)).is_err());
+        assert!(decode(&stored(&more)).is_err());
         let mut damaged = stored(&values);
         damaged[100] ^= 1;
-        let reason = decoder.decode(&damaged).unwrap_err();
+        let reason = decode(&damaged).unwrap_err();
         assert!(reason.contains("checksum"), "{reason}");
-        assert!(decoder.decode(&[]).is_err());
+        assert!(decode(&[]).is_err());
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! The cube of a product in, its runs of steps time-major out, and sums of them: what is there map-major is turned, run by run.
+//! The cube of a product in, its runs of steps time-major out, and sums of them: what is there map-major is cut otherwise, run by run.
 //!
 //! Nothing waits for it, and it may be killed at any point: what was sent and not committed is removed by clean-up, and
 //! whoever publishes next goes on. Two that do the same at once send the same values, and the second finds them there.
@@ -7,7 +7,6 @@
 use std::sync::Arc;
 
 use bytes::Bytes;
-use contract::chunk::Window;
 use contract::digest::Digest;
 use futures::future::BoxFuture;
 use futures::stream::{self, StreamExt as _, TryStreamExt as _};
@@ -19,7 +18,8 @@ use storage::Store;
 use tokio::sync::RwLock;
 use zarrs_icechunk::AsyncIcechunkStore;
 
-use crate::arrays::{self, Definition, SERIES};
+use crate::arrays::{self, Definition, SERIES, SERIES_OF_BEFORE};
+use crate::blocks::RunAxis;
 use crate::edit::ATTEMPTS;
 use crate::field::SeriesEncoder;
 use crate::layout::RUN_STEPS;
@@ -28,7 +28,7 @@ use crate::state::State;
 use crate::sums::Basis;
 use crate::{At, Cube, CubeError, Repository, complete};
 
-/// Steps whose windows are read before they are turned: 16 values side by side fill a line of a processor's cache.
+/// Steps whose windows are read at a time.
 const STEPS_AT_ONCE: usize = 16;
 
 /// A shard that is in the store, by its row and column; none where no cell has data.
@@ -93,11 +93,13 @@ impl Compaction<'_> {
         for shard in self.encoder.shards() {
             let [values, records] = self.encoded(shard).await?;
             if !self.has_series {
-                let sent = self.send(&session, &series, shard, values).await?;
+                let place = (&series, RunAxis::First.index(shard, self.run));
+                let sent = self.send(&session, place, values).await?;
                 made.series.push((shard, sent));
             }
             if self.basis.is_some() {
-                let sent = self.send(&session, &sums, shard, records).await?;
+                let place = (&sums, RunAxis::Last.index(shard, self.run));
+                let sent = self.send(&session, place, records).await?;
                 made.sums.push((shard, sent));
             }
         }
@@ -111,7 +113,7 @@ impl Compaction<'_> {
             cube.shard(run, shard).await?
         } else {
             let held = series::steps_of(run, cube.steps()).len();
-            Some(turned(cube, &self.encoder, (run, held), shard).await?)
+            Some(stacked(cube, &self.encoder, (run, held), shard).await?)
         };
         let Some(values) = values else {
             return Ok([None, None]);
@@ -134,15 +136,14 @@ impl Compaction<'_> {
     async fn send(
         &self,
         session: &RwLock<Session>,
-        path: &Path,
-        shard: [u32; 2],
+        (path, index): (&Path, [u32; 3]),
         content: Option<Bytes>,
     ) -> Result<Option<ChunkPayload>, CubeError> {
         let failed = |e: &dyn std::fmt::Display| self.repository.failed("storing a series", e);
         let Some(content) = content else {
             return Ok(None);
         };
-        let index = ChunkIndices(vec![shard[0], shard[1], self.run as u32]);
+        let index = ChunkIndices(index.to_vec());
         let writer = session.read().await.get_chunk_writer(path, &index);
         let payload = writer.map_err(|e| failed(&e))?(content).await;
         payload.map(Some).map_err(|e| failed(&e))
@@ -198,6 +199,16 @@ impl Compaction<'_> {
         })
     }
 
+    /// Removes the time-major copy that a program of before made.
+    async fn drop_copy_of_before(&self, session: &RwLock<Session>) -> Result<(), CubeError> {
+        let failed = |e: &dyn std::fmt::Display| self.repository.failed("placing a series", e);
+        let path = Path::new(&format!("/{SERIES_OF_BEFORE}")).map_err(|e| failed(&e))?;
+        match session.write().await.delete_group(path).await {
+            Err(e) if !matches!(e.kind, SessionErrorKind::NodeNotFound { .. }) => Err(failed(&e)),
+            _ => Ok(()),
+        }
+    }
+
     /// Writes what was made over a state.
     async fn write(&self, state: &State, made: &Made, name: Digest) -> Result<(), CubeError> {
         let failed = |e: &dyn std::fmt::Display| self.repository.failed("placing a series", e);
@@ -207,6 +218,7 @@ impl Compaction<'_> {
             let runs = state.runs.clone().with(run, name);
             let array = arrays::series(description, runs.len())?;
             runs.write(&arrays, (SERIES, Map::new()), array).await?;
+            self.drop_copy_of_before(&state.session).await?;
         }
         // Those that somebody else has made meanwhile count as they say, and others cannot be put beside them.
         let basis = self.basis.as_ref();
@@ -217,12 +229,13 @@ impl Compaction<'_> {
             let own = (&**basis, &runs);
             sums.write(session, &arrays, description, own).await?;
         }
-        let placed = [(self.series_path()?, &made.series)].into_iter();
-        let of_sums = basis.map(|_| Ok::<_, CubeError>((self.sums_path()?, &made.sums)));
+        let series = (self.series_path()?, RunAxis::First, &made.series);
+        let of_sums =
+            basis.map(|_| Ok::<_, CubeError>((self.sums_path()?, RunAxis::Last, &made.sums)));
         let mut session = state.session.write().await;
-        for (path, shards) in placed.chain(of_sums.transpose()?) {
-            for ([row, col], payload) in shards {
-                let here = ChunkIndices(vec![*row, *col, run as u32]);
+        for (path, axis, shards) in std::iter::once(series).chain(of_sums.transpose()?) {
+            for (shard, payload) in shards {
+                let here = ChunkIndices(axis.index(*shard, run).to_vec());
                 let set = session.set_chunk_ref(path.clone(), here, payload.clone());
                 set.await.map_err(|e| failed(&e))?;
             }
@@ -242,7 +255,7 @@ pub(crate) async fn compare(cube: &Cube, run: usize) -> Result<(), CubeError> {
     let basis = basis.filter(|_| cube.is_summed(run));
     for shard in encoder.shards() {
         let told = cube.shard(run, shard).await?;
-        let own = turned(cube, &encoder, (run, held), shard).await?;
+        let own = stacked(cube, &encoder, (run, held), shard).await?;
         let is_same = match &told {
             Some(told) => {
                 let bits = |value: &f32| value.to_bits();
@@ -274,48 +287,32 @@ pub(crate) async fn compare(cube: &Cube, run: usize) -> Result<(), CubeError> {
     Ok(())
 }
 
-/// Values of a shard of the first `held` steps of a run, `[row, col, step]`, read map-major.
-async fn turned(
+/// Values of a shard of the first `held` steps of a run, `[step, row, col]`, read map-major.
+async fn stacked(
     cube: &Cube,
     encoder: &SeriesEncoder,
     (run, held): (usize, usize),
     shard: [u32; 2],
 ) -> Result<Vec<f32>, CubeError> {
     let (window, cols) = (encoder.window(shard), encoder.shard_cols());
-    let mut turned = vec![f32::NAN; encoder.shard_values()];
+    let mut stacked = vec![f32::NAN; encoder.shard_values()];
     let all: Vec<usize> = series::steps_of(run, cube.steps()).take(held).collect();
-    for (number, steps) in all.chunks(STEPS_AT_ONCE).enumerate() {
-        let maps: Vec<Vec<f32>> = stream::iter(steps.iter().copied())
-            .map(|step| cube.window(step, window))
-            .buffered(STEPS_AT_ONCE)
-            .try_collect()
-            .await?;
-        let joined = tokio::task::spawn_blocking(move || {
-            turn(&maps, window, cols, number * STEPS_AT_ONCE, &mut turned);
-            turned
-        });
-        turned = joined.await.map_err(|e| thread(&e))?;
+    let maps = stream::iter(all).map(|step| cube.window(step, window));
+    let mut maps = maps.buffered(STEPS_AT_ONCE);
+    for map in stacked.chunks_exact_mut(encoder.shard_values() / RUN_STEPS) {
+        let Some(found) = maps.try_next().await? else {
+            break;
+        };
+        let rows = found.chunks_exact(window.cols as usize);
+        for (row, found) in map.chunks_exact_mut(cols).zip(rows) {
+            row[..found.len()].copy_from_slice(found);
+        }
     }
-    Ok(turned)
+    Ok(stacked)
 }
 
 fn thread(error: &tokio::task::JoinError) -> CubeError {
-    CubeError::library("a thread", "turning values", error)
-}
-
-/// Lays the values of some steps, `[row, col]` of a window each, side by side: `turned` is `[row, col, step]` of a shard of
-/// so many columns, and `first` the place of the first of these steps in its run.
-fn turn(maps: &[Vec<f32>], window: Window, cols: usize, first: usize, turned: &mut [f32]) {
-    let width = window.cols as usize;
-    for row in 0..window.rows as usize {
-        for col in 0..width {
-            let at = (row * cols + col) * RUN_STEPS + first;
-            let run = &mut turned[at..at + maps.len()];
-            for (value, map) in run.iter_mut().zip(maps) {
-                *value = map[row * width + col];
-            }
-        }
-    }
+    CubeError::library("a thread", "encoding values", error)
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use futures::future::BoxFuture;
 
-use crate::blocks::ChunkDecoder;
+use crate::blocks::with_decoder;
 use crate::record::{RECORD_BYTES, Record};
 use crate::stored_chunks::{StoredChunks, Undecoded};
 use crate::sums::Basis;
@@ -43,15 +43,16 @@ impl EncodedSums {
         with_squares: bool,
         mut take: impl FnMut(usize, &Record) -> bool,
     ) -> Result<(), Undecoded> {
-        let decoder = ChunkDecoder::new();
-        let mut decoder = decoder.map_err(|reason| Undecoded(0, reason))?;
         let (mut bytes, mut record) = (vec![0; RECORD_BYTES], Record::default());
-        self.content.in_order(|number, content| {
-            let read = decoder.decode(content, &mut bytes);
-            let read = read.and_then(|()| record.read(&bytes, with_squares));
-            read.map_err(|reason| Undecoded(number, reason))?;
-            Ok(take(number, &record))
-        })
+        let decoded = with_decoder(|decoder| {
+            self.content.in_order(|number, content| {
+                let read = decoder.chunks().decode(content, &mut bytes);
+                let read = read.and_then(|()| record.read(&bytes, with_squares));
+                read.map_err(|reason| Undecoded(number, reason))?;
+                Ok(take(number, &record))
+            })
+        });
+        decoded.map_err(|reason| Undecoded(0, reason))?
     }
 
     /// The error of a record that cannot be decoded, which names its object.

@@ -210,7 +210,7 @@ impl SeriesEncoder {
         self.shard[0] as usize * self.shard[1] as usize * RUN_STEPS
     }
 
-    /// Encodes a shard of `values`, `[row, col, step]`; none where no cell has data.
+    /// Encodes a shard of `values`, `[step, row, col]`; none where no cell has data.
     pub(crate) fn encode(&self, values: Vec<f32>) -> Result<Option<Bytes>, CubeError> {
         if values.iter().all(|value| value.is_nan()) {
             return Ok(None);
@@ -218,7 +218,7 @@ impl SeriesEncoder {
         object(&self.definition, values).map(Some)
     }
 
-    /// Records of sums of a shard of `values`, `[row, col, step]`.
+    /// Records of sums of a shard of `values`, `[step, row, col]`.
     pub(crate) fn records(&self, values: &[f32], shard: [u32; 2], basis: &Basis) -> Vec<u8> {
         let first_row = (shard[0] * self.shard[0]) as usize;
         let weights = basis.row_weights.get(first_row..).unwrap_or_default();

@@ -10,6 +10,7 @@ use serde_json::{Map, Value};
 use zarrs_icechunk::AsyncIcechunkStore;
 
 use crate::arrays::SERIES;
+use crate::blocks::RunAxis;
 use crate::field::SeriesEncoder;
 use crate::levels::{self, Levels, MadeOf};
 use crate::parts::{Parts, Track};
@@ -195,7 +196,8 @@ impl Layer<'_> {
         let (kept, gone) = state.runs.kept(&self.plan.steps);
         if !gone.is_empty() || kept != state.runs {
             let array = arrays::series(description, state.runs.len())?;
-            self.delete(array.path().as_str(), &gone).await?;
+            let array = (array.path().as_str(), RunAxis::First);
+            self.delete(array, &gone).await?;
             let array = arrays::series(description, kept.len())?;
             kept.write(arrays, (SERIES, Map::new()), array).await?;
         }
@@ -205,7 +207,8 @@ impl Layer<'_> {
         let (kept, gone) = state.sums.runs.kept(&self.plan.steps);
         if !gone.is_empty() || kept != state.sums.runs {
             let array = arrays::sums(description, state.sums.runs.len())?;
-            self.delete(array.path().as_str(), &gone).await?;
+            let array = (array.path().as_str(), RunAxis::Last);
+            self.delete(array, &gone).await?;
             let (sums, session) = (&state.sums, &state.session);
             let own = (&**basis, &kept);
             sums.write(session, arrays, description, own).await?;
@@ -214,12 +217,16 @@ impl Layer<'_> {
     }
 
     /// Removes all shards of some runs of an array.
-    async fn delete(&self, array: &str, runs: &[usize]) -> Result<(), CubeError> {
+    async fn delete(
+        &self,
+        (array, axis): (&str, RunAxis),
+        runs: &[usize],
+    ) -> Result<(), CubeError> {
         let path = Path::new(array);
         let path = path.map_err(|e| self.repository.failed("placing values", &e))?;
         let shards = SeriesEncoder::new(self.description)?.shards();
         let place =
-            |run: usize| move |[row, col]: &[u32; 2]| ChunkIndices(vec![*row, *col, run as u32]);
+            |run: usize| move |shard: &[u32; 2]| ChunkIndices(axis.index(*shard, run).to_vec());
         let behind = runs.iter().flat_map(|run| shards.iter().map(place(*run)));
         let mut session = self.state.session.write().await;
         let cut = session.delete_chunks(&path, behind.collect::<Vec<_>>());

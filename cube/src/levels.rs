@@ -78,7 +78,8 @@ impl Levels {
         }
         let names = names::read(store, &arrays::level_names(1)?, place).await?;
         let ranges = arrays::level_ranges(1)?;
-        let ranges: Vec<f32> = axis::read_array(store, &ranges, place).await?;
+        // Zeros alone are not stored: of steps that have no levels yet, or no other value.
+        let ranges: Vec<f32> = axis::read_array(store, &ranges, place, Some(0.0)).await?;
         let (ranges, _rest) = ranges.as_chunks::<2>();
         let made_of = |(name, range): (Option<Digest>, &[f32; 2])| {
             name.map(|values_sha256| MadeOf {

@@ -11,7 +11,7 @@ use tokio::sync::RwLock;
 use zarrs_icechunk::AsyncIcechunkStore;
 
 use crate::arrays::SERIES;
-use crate::blocks::Blocks;
+use crate::blocks::{Blocks, RunAxis};
 use crate::joining::WHOLLY_COVERED;
 use crate::layout::RUN_STEPS;
 use crate::levels::Levels;
@@ -125,6 +125,7 @@ impl Cube {
             count => {
                 let array = arrays::series(&description, count)?;
                 let array = axis::open(&store, &array, place).await?;
+                let array = (array, RunAxis::First);
                 Some(Blocks::new(array, &description, objects)?)
             }
         };
@@ -133,6 +134,7 @@ impl Cube {
             count => {
                 let array = arrays::sums(&description, count)?;
                 let array = axis::open(&store, &array, place).await?;
+                let array = (array, RunAxis::Last);
                 Some(Blocks::new(array, &description, objects)?)
             }
         };
@@ -411,7 +413,7 @@ impl Cube {
         self.0.blocks.as_ref().map(Blocks::name)
     }
 
-    /// Values of a whole shard of the time-major copy, `[row, col, step]`; none where no cell has data.
+    /// Values of a whole shard of the time-major copy, `[step, row, col]`; none where no cell has data.
     pub(crate) async fn shard(
         &self,
         run: usize,

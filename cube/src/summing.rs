@@ -6,22 +6,27 @@ use crate::scale::Scale;
 
 const SIDE: usize = BLOCK_CELLS as usize;
 
-/// Records of all blocks of a shard, row by row. `values` are `[row, col, step]`, stored unit, NaN no data, of whole blocks in
+/// Records of all blocks of a shard, row by row. `values` are `[step, row, col]`, stored unit, NaN no data, of whole blocks in
 /// `cols` columns; `row_weights` is what a cell of each row weighs, fewer where the grid ends.
 pub(crate) fn records(values: &[f32], cols: usize, row_weights: &[i64], scale: Scale) -> Vec<u8> {
-    let row_values = cols * RUN_STEPS;
-    let rows = values.len() / row_values;
+    let map_values = values.len() / RUN_STEPS;
+    let rows = map_values / cols;
     let mut out = vec![0; rows / SIDE * (cols / SIDE) * RECORD_BYTES];
     let mut written = out.chunks_exact_mut(RECORD_BYTES);
-    let mut row = Row::new(scale);
-    for (number, values) in values.chunks_exact(SIDE * row_values).enumerate() {
+    let (mut row, mut cells) = (Row::new(scale), [0.0; SIDE * RUN_STEPS]);
+    for top in (0..rows).step_by(SIDE) {
         let mut own = Record::default();
-        for block in 0..cols / SIDE {
+        for left in (0..cols).step_by(SIDE) {
             own.valid.fill(0);
-            for (at, line) in values.chunks_exact(row_values).enumerate() {
-                let cells = &line[block * SIDE * RUN_STEPS..(block + 1) * SIDE * RUN_STEPS];
-                let weight = row_weights.get(number * SIDE + at).copied();
-                row.add(cells, at * SIDE, weight.unwrap_or(0), &mut own);
+            for at in 0..SIDE {
+                let first = (top + at) * cols + left;
+                for (step, map) in values.chunks_exact(map_values).enumerate() {
+                    for (cell, value) in map[first..first + SIDE].iter().enumerate() {
+                        cells[cell * RUN_STEPS + step] = *value;
+                    }
+                }
+                let weight = row_weights.get(top + at).copied();
+                row.add(&cells, at * SIDE, weight.unwrap_or(0), &mut own);
             }
             if let Some(out) = written.next() {
                 own.write(out);
@@ -104,7 +109,7 @@ mod tests {
 
     fn values() -> Vec<f32> {
         let cells = (0..ROWS * COLS * RUN_STEPS).map(|at| {
-            let (cell, step) = (at / RUN_STEPS, at % RUN_STEPS);
+            let (step, cell) = (at / (ROWS * COLS), at % (ROWS * COLS));
             value(cell / COLS, cell % COLS, step)
         });
         cells.collect()
@@ -123,7 +128,9 @@ mod tests {
         // The grid has 13 of these rows.
         let weights: Vec<i64> = (0..13).map(|row| (1 << 36) + 7 * row).collect();
         let mut values = values();
-        values[13 * COLS * RUN_STEPS..].fill(f32::NAN);
+        for map in values.chunks_exact_mut(ROWS * COLS) {
+            map[13 * COLS..].fill(f32::NAN);
+        }
         let found = records(&values, COLS, &weights, scale);
         for block in 0..6 {
             let own = read(&found, block);
@@ -158,7 +165,7 @@ mod tests {
     fn what_cannot_be_summed_spoils_what_lies_east_of_it_and_nothing_else() {
         let scale = Scale::of(Quantity::CarbonFlux).unwrap();
         let mut values = values();
-        values[(3 * COLS + SIDE) * RUN_STEPS + 5] = f32::INFINITY;
+        values[5 * ROWS * COLS + 3 * COLS + SIDE] = f32::INFINITY;
         let found = records(&values, COLS, &[1 << 36; ROWS], scale);
         let summed: Vec<bool> = (0..6).map(|block| read(&found, block).is_summed).collect();
         assert_eq!(summed, [true, false, false, true, true, true]);

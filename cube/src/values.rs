@@ -17,7 +17,7 @@ use futures::future::BoxFuture;
 use futures::stream::{self, StreamExt as _, TryStreamExt as _};
 use storage::{Store, fields};
 
-use crate::blocks::BlockDecoder;
+use crate::blocks::with_decoder;
 use crate::field_bands::FieldBands;
 use crate::follow::folder;
 use crate::joined::joined_window;
@@ -123,18 +123,24 @@ impl EncodedBlocks {
     }
 
     /// Reads and decodes one block after the other, as they lie in their shards, and hands over its place among those asked for and its values, `[cell, step]` of 8 x 8
-    /// cells and [`RUN_STEPS`](crate::RUN_STEPS) steps, stored unit, NaN no data; those without any data are left out. `take` says whether to go on.
+    /// cells and [`RUN_STEPS`](crate::RUN_STEPS) steps, stored unit, NaN no data; those without any data are left out. `rows` says of a block which of its rows of cells
+    /// are wanted, a bit each, the northernmost lowest; values of others are any. `take` says whether to go on.
     ///
     /// # Errors
     /// The first block that is damaged; [`EncodedBlocks::error`] makes an error of it.
-    pub fn each(&self, mut take: impl FnMut(usize, &[f32]) -> bool) -> Result<(), Undecoded> {
-        let decoder = BlockDecoder::new();
-        let mut decoder = decoder.map_err(|reason| Undecoded(0, reason))?;
-        self.content.each(|number, content| {
-            let values = decoder.decode(content);
-            let values = values.map_err(|reason| Undecoded(number, reason))?;
-            Ok(take(number, values))
-        })
+    pub fn each(
+        &self,
+        rows: impl Fn(usize) -> u8,
+        mut take: impl FnMut(usize, &[f32]) -> bool,
+    ) -> Result<(), Undecoded> {
+        let decoded = with_decoder(|decoder| {
+            self.content.each(|number, content| {
+                let values = decoder.decode(content, rows(number));
+                let values = values.map_err(|reason| Undecoded(number, reason))?;
+                Ok(take(number, values))
+            })
+        });
+        decoded.map_err(|reason| Undecoded(0, reason))?
     }
 
     /// The error of a block that cannot be decoded, which names its object.
@@ -535,7 +541,11 @@ impl DecodedRun {
     /// Of `windows` those cells that blocks have.
     fn of(encoded: &EncodedBlocks, windows: &[Window]) -> Result<Self, Undecoded> {
         let mut blocks = vec![];
-        encoded.each(|number, values| {
+        let rows = |number: usize| {
+            let Window { row, rows, .. } = windows[number];
+            (row..row + rows).fold(0, |bits, row| bits | 1 << (row % BLOCK_CELLS))
+        };
+        encoded.each(rows, |number, values| {
             blocks.push((number, picked(values, windows[number], encoded.pieces())));
             true
         })?;

@@ -13,7 +13,7 @@ use self::totals::Totals;
 use super::accumulator::StepSums;
 use super::cells::CellWeight;
 use super::histogram::{Buckets, Histograms};
-use super::values::Values;
+use super::values::{EqualCells, Values};
 use crate::budget::fixed::OutOfRange;
 
 /// Sums of cells of equal weight by step, before they are multiplied with it.
@@ -44,15 +44,15 @@ impl Equal {
         }
     }
 
-    /// Adds a cell's run of steps; is a value among them that cannot be summed?
-    fn add(&mut self, values: &[f32], steps: Steps) -> bool {
-        self.cell_count += 1;
+    /// Adds cells' runs of steps; is a value among them that cannot be summed?
+    fn add(&mut self, cells: EqualCells<'_>, steps: Steps) -> bool {
+        self.cell_count += cells.count;
         let mut to = ByStep {
             counts: &mut self.counts,
             steps: &mut self.sums,
             squares: &mut self.squares,
         };
-        lanes::add(values, steps, &mut to)
+        lanes::add(cells, steps, &mut to)
     }
 
     /// Adds what was added up to the totals of the steps from `first` on, with the cells' weight.
@@ -118,43 +118,66 @@ impl Summing {
             }
             self.steps = steps;
         }
-        let first = self.steps.start;
-        let is_block = cells.len() == ROWS * ROWS;
-        for (cell, weight) in cells.iter().enumerate() {
-            if weight.weight == 0 {
-                continue;
-            }
-            let own = values.steps(cell, self.steps.len());
-            self.totals.look_at(first, own);
-            let row = &mut self.rows[if is_block { cell / ROWS } else { 0 }];
-            let is_alone =
-                row.cell_count > 0 && row.weight != *weight && cells.get(cell + 1) != Some(weight);
-            if is_alone && !self.with_squares {
-                if self.totals.add_cell(first, own, self.steps_of, *weight) {
-                    return Err(self.beyond(own));
+        let row_cells = if cells.len() == ROWS * ROWS {
+            ROWS
+        } else {
+            cells.len().max(1)
+        };
+        let mut first = 0;
+        for (row, own) in cells.chunks(row_cells).enumerate() {
+            let equal = own.chunk_by(PartialEq::eq);
+            for equal in equal.flat_map(|equal| equal.chunks(MOST_CELLS)) {
+                let run = first..first + equal.len();
+                first = run.end;
+                if equal[0].weight != 0 {
+                    self.add_equal(values, run, equal[0], row)?;
                 }
-                continue;
-            }
-            let to = if is_alone { &mut self.alone } else { row };
-            if to.weight != *weight || to.cell_count == MOST_CELLS {
-                to.flush(first, &mut self.totals);
-                to.weight = *weight;
-            }
-            if to.add(own, self.steps_of) {
-                return Err(self.beyond(own));
-            }
-            if is_alone {
-                to.flush(first, &mut self.totals);
             }
         }
         Ok(())
     }
 
+    /// Adds cells of a row side by side that weigh the same.
+    fn add_equal(
+        &mut self,
+        values: Values<'_>,
+        cells: Range<usize>,
+        weight: CellWeight,
+        row: usize,
+    ) -> Result<(), OutOfRange> {
+        let (first, step_count) = (self.steps.start, self.steps.len());
+        if self.totals.looks_at_extremes() {
+            for cell in cells.clone() {
+                self.totals.look_at(first, values.steps(cell, step_count));
+            }
+        }
+        let row = &mut self.rows[row];
+        let is_alone = row.cell_count > 0 && row.weight != weight && cells.len() == 1;
+        let is_beyond = if is_alone && !self.with_squares {
+            let own = values.steps(cells.start, step_count);
+            self.totals.add_cell(first, own, self.steps_of, weight)
+        } else {
+            let to = if is_alone { &mut self.alone } else { row };
+            if to.weight != weight || to.cell_count + cells.len() > MOST_CELLS {
+                to.flush(first, &mut self.totals);
+                to.weight = weight;
+            }
+            let is_beyond = to.add(values.equal_cells(cells.clone()), self.steps_of);
+            if is_alone {
+                to.flush(first, &mut self.totals);
+            }
+            is_beyond
+        };
+        if is_beyond {
+            let all = cells.flat_map(|cell| values.steps(cell, step_count));
+            return Err(self.beyond(all));
+        }
+        Ok(())
+    }
+
     /// The value that cannot be summed.
-    fn beyond(&self, values: &[f32]) -> OutOfRange {
-        let beyond = values
-            .iter()
-            .find(|it| !it.is_nan() && !self.scale.holds(**it));
+    fn beyond<'a>(&self, mut values: impl Iterator<Item = &'a f32>) -> OutOfRange {
+        let beyond = values.find(|it| !it.is_nan() && !self.scale.holds(**it));
         OutOfRange(beyond.copied().unwrap_or(f32::NAN).into())
     }
 

@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use cube::BLOCK_CELLS;
+
 use super::accumulator::{Accumulated, too_large};
 use super::cells::CellWeight;
 use super::kernel::{Summing, Target, add_weights};
@@ -15,6 +17,22 @@ use crate::budget::fixed::OutOfRange;
 pub(super) enum CellShares {
     Weights(Vec<CellWeight>),
     Areas(Vec<CellArea>),
+}
+
+impl CellShares {
+    /// Rows of a block that have some of the geometry, a bit each, the first one lowest.
+    pub(super) fn block_rows(&self) -> u8 {
+        let is_wanted = |cell: usize| match self {
+            Self::Weights(cells) => cells[cell].weight != 0,
+            Self::Areas(cells) => cells[cell].whole_m2 != 0.0 || cells[cell].sea_m2 != 0.0,
+        };
+        let count = match self {
+            Self::Weights(cells) => cells.len(),
+            Self::Areas(cells) => cells.len(),
+        };
+        let own = (0..count).filter(|cell| is_wanted(*cell));
+        own.fold(0, |bits, cell| bits | 1 << (cell / BLOCK_CELLS as usize))
+    }
 }
 
 /// What is accumulated of a piece.

@@ -9,9 +9,9 @@ use contract::key::ObjectKey;
 use contract::manifest::{Manifest, ManifestId};
 use cube::Values;
 use datafusion::arrow::array::{Array as _, AsArray as _, RecordBatch};
-use futures::{StreamExt as _, TryStreamExt as _, stream};
 
 use super::accumulator::Accumulated;
+use super::piece_queue;
 use super::question::{Piece, Question};
 use super::task::{Task, Worker};
 use super::tasks::PIECE_BYTES;
@@ -68,14 +68,7 @@ async fn in_process(
     // One is read while the others are reduced; each is held as it was stored, and as it is reduced.
     let held = engine.memory_bytes() / (4 * PIECE_BYTES as usize);
     let at_once = (engine.partitions().get() + 1).min(held.max(1));
-    let mut reduced = stream::iter(pieces)
-        .map(|piece| worker.reduce(piece))
-        .buffer_unordered(at_once);
-    let mut all = Accumulated::default();
-    while let Some(part) = reduced.try_next().await? {
-        all.merge(part)?;
-    }
-    Ok(all)
+    piece_queue::reduced(&worker, pieces, at_once).await
 }
 
 async fn distributed(

@@ -12,6 +12,7 @@ use storage::{StorageError, fields};
 
 use super::accumulator::Accumulated;
 use super::cells::{self, Cells, block, block_window};
+use super::piece_queue;
 use super::question::{Layout, Piece, Question, Wanted};
 use super::reduction::{CellShares, Reduction};
 use super::remembered_shares::RememberedShares;
@@ -104,18 +105,14 @@ impl Task {
             return Ok(None);
         }
         let worker = Worker::new(objects, self.question, values).await?;
-        let mut all = Accumulated::default();
-        for piece in self.pieces {
-            match worker.reduce(piece).await {
-                // Chunks that are gone or damaged: the fields say what they held.
-                Err(ComputeError::Cube(error)) if !error.is_retryable() => {
-                    tracing::warn!(%error, "a cube cannot be read");
-                    return Ok(None);
-                }
-                reduced => all.merge(reduced?)?,
+        match piece_queue::reduced(&worker, self.pieces, 1).await {
+            // Chunks that are gone or damaged: the fields say what they held.
+            Err(ComputeError::Cube(error)) if !error.is_retryable() => {
+                tracing::warn!(%error, "a cube cannot be read");
+                Ok(None)
             }
+            reduced => reduced.map(Some),
         }
-        Ok(Some(all))
     }
 }
 
@@ -156,7 +153,7 @@ impl Worker {
         })
     }
 
-    /// Reads the values of a piece and reduces them.
+    /// Reads the values of a piece and reduces them, which keeps the thread that it is polled on busy.
     ///
     /// # Errors
     /// They cannot be read, are damaged, or beyond anything physical.
@@ -167,7 +164,6 @@ impl Worker {
             Layout::Field(_) => {}
         }
         let stored = self.objects.stored(&piece.key, &piece.address)?;
-        let piece = Arc::new(piece);
         let first = self.tried(&stored, &piece).await;
         match first {
             // What is remembered of the file may be that of a damaged one, which was stored anew since.
@@ -179,11 +175,7 @@ impl Worker {
         }
     }
 
-    async fn tried(
-        &self,
-        stored: &Stored,
-        piece: &Arc<Piece>,
-    ) -> Result<Accumulated, ComputeError> {
+    async fn tried(&self, stored: &Stored, piece: &Piece) -> Result<Accumulated, ComputeError> {
         let Layout::Field(period) = piece.layout else {
             return Err(ComputeError::inconsistent(piece.key.as_str(), NOT_OPENED));
         };
@@ -191,10 +183,9 @@ impl Worker {
         let fetched = storage::rows::fetch(stored, index, piece.rows.clone()).await?;
         let windows = cells::chunks(self.question.shape);
         let expected = windows.clone();
-        self.beside(piece, windows, move |take| {
+        self.reduced(piece, &windows, |take| {
             fetched.each(|row| fields::expected(&expected, row, period), take)
         })
-        .await
     }
 
     /// Reads blocks of the version along time and reduces them.
@@ -210,12 +201,7 @@ impl Worker {
         let Some(encoded) = encoded else {
             return Err(ComputeError::inconsistent(piece.key.as_str(), NOT_OPENED));
         };
-        let (worker, piece) = (self.clone(), Arc::new(piece));
-        let encoded = Arc::new(encoded);
-        let own = Arc::clone(&encoded);
-        let reduced = tokio::task::spawn_blocking(move || worker.reduced_blocks(&piece, &own));
-        let reduced = reduced.await;
-        match reduced.map_err(|e| ComputeError::inconsistent("statistics", e))? {
+        match self.reduced_blocks(&piece, &encoded) {
             Ok(reduced) => reduced,
             Err(undecoded) => Err(encoded.error(undecoded).await.into()),
         }
@@ -228,27 +214,23 @@ impl Worker {
         let values = self.values.clone().ok_or_else(not_opened)?;
         let basis = values.summed_as(&steps).ok_or_else(not_opened)?;
         let across = self.question.shape[1].div_ceil(BLOCK_CELLS);
-        let terms = Arc::new(Terms::of(&piece.inside, across, basis.shard_cols));
+        let terms = Terms::of(&piece.inside, across, basis.shard_cols);
         let places = terms.blocks().map(|block| [block / across, block % across]);
         let places: Vec<[u32; 2]> = places.collect();
         let encoded = values.sums(&places, steps).await?;
-        let encoded = Arc::new(encoded.ok_or_else(not_opened)?);
-        let (worker, piece) = (self.clone(), Arc::new(piece));
-        let (own, of) = (Arc::clone(&encoded), Arc::clone(&piece));
-        let reduced = tokio::task::spawn_blocking(move || worker.reduced_sums(&of, &terms, &own));
-        let reduced = reduced.await;
-        let (mut all, rest) =
-            match reduced.map_err(|e| ComputeError::inconsistent("statistics", e))? {
-                Ok(reduced) => reduced,
-                Err(undecoded) => return Err(encoded.error(undecoded).await.into()),
-            };
+        let encoded = encoded.ok_or_else(not_opened)?;
+        let (mut all, rest) = match self.reduced_sums(&piece, &terms, &encoded) {
+            Ok(reduced) => reduced,
+            Err(undecoded) => return Err(encoded.error(undecoded).await.into()),
+        };
         if !rest.is_empty() {
             let runs = rest.iter().map(|run| &piece.inside[*run]);
+            let rows = runs.flat_map(|run| run.first..=run.last).collect();
             let rest = Piece {
                 layout: Layout::Blocks,
-                rows: runs.flat_map(|run| run.first..=run.last).collect(),
+                rows,
                 inside: vec![],
-                ..Piece::clone(&piece)
+                ..piece
             };
             all.merge(self.blocks(rest).await?)?;
         }
@@ -307,33 +289,24 @@ impl Worker {
         let made = |number: u32| self.cells_of(block_window(shape, number), true);
         let shares = self.shares.of(&piece.rows, made);
         let mut failed = None;
-        blocks.each(|number, values| {
-            let cells = &shares[number];
-            let added = blocks.pieces().iter().try_for_each(|run| {
-                let run_values = Values {
-                    of: values,
-                    step_count: RUN_STEPS,
-                    first: run.in_run,
-                };
-                reduction.add(run_values, cells, run.asked..run.asked + run.count)
-            });
-            failed = added.err();
-            failed.is_none()
-        })?;
+        let rows: Vec<u8> = shares.iter().map(|own| own.block_rows()).collect();
+        blocks.each(
+            |number| rows[number],
+            |number, values| {
+                let cells = &shares[number];
+                let added = blocks.pieces().iter().try_for_each(|run| {
+                    let run_values = Values {
+                        of: values,
+                        step_count: RUN_STEPS,
+                        first: run.in_run,
+                    };
+                    reduction.add(run_values, cells, run.asked..run.asked + run.count)
+                });
+                failed = added.err();
+                failed.is_none()
+            },
+        )?;
         Ok(failed.map_or_else(|| Ok(reduction.accumulated()), Err))
-    }
-
-    /// Reduces rows on a thread of its own; `each` hands them over, `windows` are where they lie.
-    async fn beside(
-        &self,
-        piece: &Arc<Piece>,
-        windows: Vec<Window>,
-        each: impl FnOnce(&mut Take<'_>) -> Result<(), ComputeError> + Send + 'static,
-    ) -> Result<Accumulated, ComputeError> {
-        let (worker, piece) = (self.clone(), Arc::clone(piece));
-        let reduced = tokio::task::spawn_blocking(move || worker.reduced(&piece, &windows, each));
-        let reduced = reduced.await;
-        reduced.map_err(|e| ComputeError::inconsistent("statistics", e))?
     }
 
     /// Reduces rows.

@@ -54,12 +54,12 @@ impl Band {
     /// The cells of a window within the band.
     pub(super) fn window(&self, window: Window) -> Vec<f64> {
         let rows = window.row - self.first_row..window.row - self.first_row + window.rows;
-        rows.flat_map(|row| {
+        let mut areas_m2 = Vec::with_capacity(window.cell_count());
+        for row in rows {
             let start = row as usize * self.cols + window.col as usize;
-            &self.areas_m2[start..start + window.cols as usize]
-        })
-        .copied()
-        .collect()
+            areas_m2.extend_from_slice(&self.areas_m2[start..start + window.cols as usize]);
+        }
+        areas_m2
     }
 }
 

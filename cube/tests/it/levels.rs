@@ -165,6 +165,26 @@ async fn a_grid_of_512_cells_a_side_has_no_levels_and_nothing_of_them() {
 }
 
 #[tokio::test]
+async fn steps_of_zeros_alone_and_without_data_have_levels() {
+    let store = Store::memory();
+    let zeros: Arc<[f32]> = vec![0.0; REGION.cell_count()].into();
+    let cube = cube_of(&store, Quantity::CarbonFlux, REGION, zeros).await;
+    assert_eq!(cube.range_of(0), Some([0.0; 2]));
+    let level = cube.levels().next().unwrap();
+    let found = all_of(&cube, level, 0).await;
+    assert!(found.values.iter().all(|value| *value == 0.0));
+    let repository = Repository::open(&store, "p").await.unwrap();
+    let mut edit = Edit::begin(&repository).await.unwrap();
+    let none: Arc<[f32]> = vec![f32::NAN; REGION.cell_count()].into();
+    edit.put(month(2), none).await.unwrap();
+    edit.commit("two").await.unwrap();
+    let cube = repository.at(&At::Newest).await.unwrap();
+    assert!(cube.has_levels(0) && cube.has_levels(1));
+    let found = all_of(&cube, cube.levels().next().unwrap(), 1).await;
+    assert!(found.values.iter().all(|value| value.is_nan()));
+}
+
+#[tokio::test]
 async fn directions_become_mean_vectors_and_codes_one_of_themselves() {
     let grid = grid(4, 516);
     let wind = Quantity::open("wind_from", "degree", "Wind from").unwrap();

@@ -1,7 +1,9 @@
-//! Loops over the steps of one cell: values in, whole numbers added to sums out. They are compiled for any processor and for those
+//! Loops over the steps of cells: values in, whole numbers added to sums out. They are compiled for any processor and for those
 //! that take four numbers at a time (AVX2) or eight (AVX-512); all add the same integers.
 
 use cube::scale::{Scale, nearest};
+
+use crate::reduce::values::EqualCells;
 
 /// How values become steps of a scale, worked out once.
 #[derive(Debug, Clone, Copy)]
@@ -43,18 +45,18 @@ pub(super) struct ByStep<'a> {
     pub(super) squares: &'a mut [i64],
 }
 
-/// Adds the values of a cell; is one among them that cannot be summed? Then the sums say nothing.
-pub(super) fn add(values: &[f32], steps: Steps, to: &mut ByStep<'_>) -> bool {
+/// Adds the values of cells; is one among them that cannot be summed? Then the sums say nothing.
+pub(super) fn add(cells: EqualCells<'_>, steps: Steps, to: &mut ByStep<'_>) -> bool {
     #[cfg(target_arch = "x86_64")]
     #[expect(unsafe_code, reason = "the processor has what it is compiled for")]
     match Lanes::of_this_processor() {
         // SAFETY: the processor was asked.
-        Lanes::Eight => return unsafe { add_avx512(values, steps, to) },
+        Lanes::Eight => return unsafe { add_avx512(cells, steps, to) },
         // SAFETY: as above.
-        Lanes::Four => return unsafe { add_avx2(values, steps, to) },
+        Lanes::Four => return unsafe { add_avx2(cells, steps, to) },
         Lanes::Any => {}
     }
-    add_any(values, steps, to)
+    add_any(cells, steps, to)
 }
 
 /// How many numbers a processor takes at a time.
@@ -85,34 +87,71 @@ impl Lanes {
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512dq,avx512vl")]
-fn add_avx512(values: &[f32], steps: Steps, to: &mut ByStep<'_>) -> bool {
-    add_any(values, steps, to)
+fn add_avx512(cells: EqualCells<'_>, steps: Steps, to: &mut ByStep<'_>) -> bool {
+    add_any(cells, steps, to)
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
-fn add_avx2(values: &[f32], steps: Steps, to: &mut ByStep<'_>) -> bool {
-    add_any(values, steps, to)
+fn add_avx2(cells: EqualCells<'_>, steps: Steps, to: &mut ByStep<'_>) -> bool {
+    add_any(cells, steps, to)
+}
+
+/// Steps that are added at once: their sums are in registers while cell after cell comes.
+const AT_ONCE: usize = 8;
+
+#[expect(clippy::inline_always, reason = "it is compiled several times")]
+#[inline(always)]
+fn add_any(cells: EqualCells<'_>, steps: Steps, to: &mut ByStep<'_>) -> bool {
+    let (all, mut is_beyond) = (to.counts.len(), false);
+    let whole = all - all % AT_ONCE;
+    for first in (0..whole).step_by(AT_ONCE) {
+        is_beyond |= add_lanes::<AT_ONCE>(cells, steps, first, to);
+    }
+    for first in whole..all {
+        is_beyond |= add_lanes::<1>(cells, steps, first, to);
+    }
+    is_beyond
 }
 
 #[expect(clippy::inline_always, reason = "it is compiled several times")]
 #[inline(always)]
-fn add_any(values: &[f32], steps: Steps, to: &mut ByStep<'_>) -> bool {
-    let mut beyond = 0;
-    for ((count, sum), value) in to.counts.iter_mut().zip(&mut *to.steps).zip(values) {
-        let is_there = !value.is_nan();
-        let own = steps.distance(*value);
-        // Of what is beyond anything physical this is some number.
-        *sum = sum.wrapping_add(if is_there { nearest(own) } else { 0 });
-        *count += i64::from(is_there);
-        beyond |= i64::from(own.abs() > steps.most);
+fn add_lanes<const N: usize>(
+    cells: EqualCells<'_>,
+    steps: Steps,
+    first: usize,
+    to: &mut ByStep<'_>,
+) -> bool {
+    let (mut counts, mut sums, mut beyond) = ([0; N], [0i64; N], [0; N]);
+    for values in cells.lanes::<N>(first) {
+        for lane in 0..N {
+            let is_there = !values[lane].is_nan();
+            let own = steps.distance(values[lane]);
+            // Of what is beyond anything physical this is some number.
+            sums[lane] = sums[lane].wrapping_add(if is_there { nearest(own) } else { 0 });
+            counts[lane] += i64::from(is_there);
+            beyond[lane] |= i64::from(own.abs() > steps.most);
+        }
     }
-    for (sum, value) in to.squares.iter_mut().zip(values) {
-        let own = steps.distance(*value);
-        let square = nearest(own * own * steps.squares_per_step);
-        *sum = sum.wrapping_add(if value.is_nan() { 0 } else { square });
+    for lane in 0..N {
+        to.counts[first + lane] += counts[lane];
+        to.steps[first + lane] = to.steps[first + lane].wrapping_add(sums[lane]);
     }
-    beyond != 0
+    if !to.squares.is_empty() {
+        let mut squares = [0i64; N];
+        for values in cells.lanes::<N>(first) {
+            for lane in 0..N {
+                let own = steps.distance(values[lane]);
+                let square = nearest(own * own * steps.squares_per_step);
+                let is_there = !values[lane].is_nan();
+                squares[lane] = squares[lane].wrapping_add(if is_there { square } else { 0 });
+            }
+        }
+        for (own, square) in to.squares[first..first + N].iter_mut().zip(squares) {
+            *own = own.wrapping_add(square);
+        }
+    }
+    beyond.iter().any(|lane| *lane != 0)
 }
 
 /// Sums by step times the weights of cells, all of one length.
@@ -262,7 +301,15 @@ mod tests {
 
     use super::*;
 
-    type Add = dyn Fn(&[f32], Steps, &mut ByStep<'_>) -> bool;
+    type Add = dyn Fn(EqualCells<'_>, Steps, &mut ByStep<'_>) -> bool;
+
+    fn one_cell(values: &[f32]) -> EqualCells<'_> {
+        EqualCells {
+            of: values,
+            stride: values.len(),
+            count: 1,
+        }
+    }
 
     /// Those that this processor can run.
     fn compilations() -> Vec<&'static Add> {
@@ -271,9 +318,45 @@ mod tests {
         if is_x86_feature_detected!("avx2") {
             #[expect(unsafe_code, reason = "the processor was asked")]
             // SAFETY: the line before.
-            all.push(&|values, steps, to| unsafe { add_avx2(values, steps, to) });
+            all.push(&|cells, steps, to| unsafe { add_avx2(cells, steps, to) });
         }
         all
+    }
+
+    #[test]
+    fn cells_that_are_added_together_add_what_they_would_one_by_one() {
+        let scale = Scale::of(Quantity::CarbonFlux).unwrap();
+        let steps = Steps::of(scale);
+        for (stride, length, count) in [(128, 128, 8), (128, 53, 3), (20, 13, 1), (9, 1, 5)] {
+            let value = |at: usize| match at % 5 {
+                2 => f32::NAN,
+                part => (part as f32 - 1.5) * 1e-8 * at as f32,
+            };
+            let all: Vec<f32> = (0..stride * count).map(value).collect();
+            let sums = |parts: &[EqualCells<'_>], add: &Add| {
+                let mut own = [vec![1; length], vec![2; length], vec![3; length]];
+                let [counts, steps_, squares] = &mut own;
+                let mut to = ByStep {
+                    counts,
+                    steps: steps_,
+                    squares,
+                };
+                for part in parts {
+                    assert!(!add(*part, steps, &mut to));
+                }
+                own
+            };
+            let cells = |first: usize, count: usize| EqualCells {
+                of: &all[first * stride..],
+                stride,
+                count,
+            };
+            let each: Vec<EqualCells<'_>> = (0..count).map(|cell| cells(cell, 1)).collect();
+            let expected = sums(&each, &add_any);
+            for compiled in compilations() {
+                assert_eq!(sums(&[cells(0, count)], compiled), expected);
+            }
+        }
     }
 
     /// The heaviest cell that there is, and less of it for coverage.
@@ -329,7 +412,7 @@ mod tests {
                         steps,
                         squares,
                     };
-                    let is_beyond = add(values, Steps::of(scale), &mut to);
+                    let is_beyond = add(one_cell(values), Steps::of(scale), &mut to);
                     (is_beyond, all)
                 };
                 let found = of(&add_any, &values);

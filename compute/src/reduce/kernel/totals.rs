@@ -118,6 +118,11 @@ impl Totals {
         self.product_count = 0;
     }
 
+    /// Are extremes wanted?
+    pub(super) fn looks_at_extremes(&self) -> bool {
+        !self.extremes.is_empty()
+    }
+
     /// Takes the extremes of a cell, if they are wanted.
     pub(super) fn look_at(&mut self, first: usize, values: &[f32]) {
         let own = self.extremes.get_mut(first..first + values.len());
