@@ -1,8 +1,6 @@
 //! [`CheckedBand`]s in, [`EncodedGrid`] out: the bytes of a field, written as its bands come, and the key that the digest of its
 //! values gives it.
 
-mod spool;
-
 use std::path::Path;
 
 use contract::chunk::CHUNK_ROWS;
@@ -14,12 +12,12 @@ use contract::time::Period;
 use storage::StorageError;
 use storage::content::Content;
 use storage::fields::Writer;
+use storage::spool::Spool;
 
 use crate::check::CheckedBand;
 use crate::error::IngestError;
-use spool::Spool;
 
-pub(crate) use spool::HELD_BYTES;
+pub(crate) use storage::spool::HELD_BYTES;
 
 /// One step as the bytes of a field.
 #[derive(Debug, Clone)]
@@ -72,12 +70,19 @@ impl Encoding {
     pub(crate) fn finish(self, product: &ProductId) -> Result<(ObjectKey, Content), IngestError> {
         let Self { spool, field, .. } = self;
         let (digest, _) = field.finish().map_err(|e| failed(&spool, e))?;
-        Ok((ObjectKey::field(product, &digest), spool.into_content()?))
+        let content = spool.into_content().map_err(unspooled)?;
+        Ok((ObjectKey::field(product, &digest), content))
     }
 }
 
 /// A full disk is no fault of the field.
 fn failed(spool: &Spool, error: StorageError) -> IngestError {
-    let unwritten = spool.failure();
-    unwritten.unwrap_or_else(|| IngestError::storage("encode a field")(error))
+    unspooled(spool.or_failure(error))
+}
+
+fn unspooled(error: StorageError) -> IngestError {
+    match error {
+        StorageError::Spool { folder, source } => IngestError::Spool { folder, source },
+        error => IngestError::storage("encode a field")(error),
+    }
 }

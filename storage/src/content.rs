@@ -3,7 +3,7 @@
 
 use std::fmt::{Debug, Formatter};
 use std::fs::File;
-use std::io;
+use std::io::{self, Read};
 use std::ops::Range;
 use std::os::unix::fs::FileExt as _;
 use std::sync::Arc;
@@ -12,6 +12,7 @@ use bytes::Bytes;
 use contract::digest::Digest;
 use contract::key::ObjectKey;
 use contract::kind::Vouched;
+use parquet::file::reader::{ChunkReader, Length};
 use sha2::{Digest as _, Sha256};
 
 /// Bytes of a file that are read at a time.
@@ -101,6 +102,45 @@ impl Content {
             at: 0,
             check,
         }
+    }
+}
+
+impl Length for Content {
+    fn len(&self) -> u64 {
+        self.size_bytes()
+    }
+}
+
+/// So that a table is read from it piece by piece.
+impl ChunkReader for Content {
+    type T = Tail;
+
+    fn get_read(&self, start: u64) -> parquet::errors::Result<Tail> {
+        Ok(Tail {
+            content: self.clone(),
+            at: start,
+        })
+    }
+
+    fn get_bytes(&self, start: u64, length: usize) -> parquet::errors::Result<Bytes> {
+        Ok(self.part(start..start.saturating_add(length as u64))?)
+    }
+}
+
+/// What comes from some place on.
+pub struct Tail {
+    content: Content,
+    at: u64,
+}
+
+impl Read for Tail {
+    fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
+        let left = self.content.size_bytes().saturating_sub(self.at);
+        let count = left.min(into.len() as u64);
+        let part = self.content.part(self.at..self.at + count)?;
+        into[..part.len()].copy_from_slice(&part);
+        self.at += count;
+        Ok(part.len())
     }
 }
 

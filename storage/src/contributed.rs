@@ -1,27 +1,29 @@
 //! How complete the sums of accumulated carbon are: steps and time that contributed to every cell, map-major, a row a
 //! chunk, stored beside the field of the sums.
 
+mod reader;
+mod writer;
+
 use std::sync::{Arc, LazyLock};
 
-use arrow::array::{
-    Int64Builder, ListBuilder, RecordBatch, TimestampMillisecondArray, UInt32Array, UInt32Builder,
-};
-use arrow::datatypes::{
-    DataType, Field, Int64Type, Schema, SchemaRef, TimeUnit, TimestampMillisecondType, UInt32Type,
-};
+use arrow::datatypes::{DataType, Field, Schema, SchemaRef, TimeUnit};
 use bytes::Bytes;
-use contract::chunk::{Window, field_chunks};
 use contract::digest::Digest;
 use contract::grid::Grid;
 use contract::key::ObjectKey;
-use contract::kind::Vouched;
 use contract::product::ProductId;
 use contract::time::{Period, TimeMs};
+use sha2::{Digest as _, Sha256};
 
-use crate::parquet_table::{self, shape_only};
-use crate::sound::damage;
+use crate::off_thread::off_thread;
+use crate::spool::FOLDER;
 use crate::{StorageError, Store};
 
+pub use reader::Reader;
+pub use writer::Spooled;
+
+/// Numbers whose bytes are hashed together.
+const HASHED_AT_ONCE: usize = 1024;
 const CHUNKS_PER_GROUP: usize = 64;
 
 /// Columns: `chunk`, `period_start`, `period_end`, `of_steps`, `steps`, `milliseconds`.
@@ -103,101 +105,49 @@ impl Contributed {
     }
 
     /// Digest of the numbers themselves, whatever an encoder makes of them.
+    #[cfg(test)]
     fn digest(&self) -> Digest {
-        let Period { start, end } = self.period;
-        let head = [start.ms(), end.ms(), i64::from(self.of_steps)];
-        let mut bytes: Vec<u8> = head.iter().flat_map(|n| n.to_le_bytes()).collect();
-        bytes.extend(self.steps.iter().flat_map(|n| n.to_le_bytes()));
-        bytes.extend(self.milliseconds.iter().flat_map(|n| n.to_le_bytes()));
-        Digest::of(&bytes)
+        let mut numbers = NumbersDigest::new(self.period, self.of_steps);
+        numbers.steps(&self.steps);
+        numbers.milliseconds(&self.milliseconds);
+        numbers.finish()
     }
 }
 
-fn encode(grid: &Grid, counts: &Contributed) -> Result<Bytes, StorageError> {
-    let windows = field_chunks(grid);
-    let mut steps = ListBuilder::new(UInt32Builder::new()).with_field(item(DataType::UInt32));
-    let mut milliseconds = ListBuilder::new(Int64Builder::new()).with_field(item(DataType::Int64));
-    for window in &windows {
-        for cell in window.cell_indices(grid) {
-            steps.values().append_value(counts.steps[cell]);
-            milliseconds
-                .values()
-                .append_value(counts.milliseconds[cell]);
-        }
-        steps.append(true);
-        milliseconds.append(true);
-    }
-    let time = |t: TimeMs| {
-        Arc::new(TimestampMillisecondArray::from(vec![t.ms(); windows.len()]).with_timezone("UTC"))
-    };
-    let batch = RecordBatch::try_new(
-        Arc::clone(&SCHEMA),
-        vec![
-            Arc::new(UInt32Array::from_iter_values(0..windows.len() as u32)),
-            time(counts.period.start),
-            time(counts.period.end),
-            Arc::new(UInt32Array::from(vec![counts.of_steps; windows.len()])),
-            Arc::new(steps.finish()),
-            Arc::new(milliseconds.finish()),
-        ],
-    )
-    .map_err(|e| StorageError::damaged("counts to write", e))?;
-    parquet_table::encode(&batch, CHUNKS_PER_GROUP, &[grid.rows, grid.cols])
-}
+/// The digest that counts are named by: all steps come before all milliseconds.
+struct NumbersDigest(Sha256);
 
-/// Counts of what is named by its numbers; on the grid that they say, which must be `grid` where that is known.
-fn decode(
-    key: &ObjectKey,
-    content: Bytes,
-    grid: Option<&Grid>,
-) -> Result<Contributed, StorageError> {
-    let damaged = |reason: &str| damage::found(key, reason);
-    let table = parquet_table::decode(key, content, &SCHEMA)?;
-    let [rows, cols] = table.shape[..] else {
-        return Err(damaged("it does not say how large its grid is"));
-    };
-    if grid.is_some_and(|grid| (grid.rows, grid.cols) != (rows, cols)) {
-        return Err(damaged("it is of another grid than its product"));
+impl NumbersDigest {
+    fn new(period: Period, of_steps: u32) -> Self {
+        let mut hasher = Sha256::new();
+        for number in [period.start.ms(), period.end.ms(), i64::from(of_steps)] {
+            hasher.update(number.to_le_bytes());
+        }
+        Self(hasher)
     }
-    let (batch, grid) = (&table.batch, shape_only(rows, cols));
-    let windows = field_chunks(&grid);
-    let row_count = batch.num_rows();
-    if row_count != windows.len() || row_count == 0 {
-        return Err(damaged("it has other chunks than its grid"));
-    }
-    let time = |column: usize| {
-        let times = parquet_table::numbers::<TimestampMillisecondType>(batch, column);
-        TimeMs::new(times.value(0)).map_err(|e| damage::found(key, e))
-    };
-    let period = Period::new(time(1)?, time(2)?).map_err(|e| damage::found(key, e))?;
-    let mut counts = Contributed {
-        of_steps: parquet_table::numbers::<UInt32Type>(batch, 3).value(0),
-        ..Contributed::nothing(&grid, period.start)
-    };
-    counts.period = period;
-    let chunks = parquet_table::numbers::<UInt32Type>(batch, 0);
-    for row in 0..row_count {
-        let steps = parquet_table::row_values::<UInt32Type>(batch, 4, row);
-        let milliseconds = parquet_table::row_values::<Int64Type>(batch, 5, row);
-        let fits = |window: &&Window| [steps.len(), milliseconds.len()] == [window.cell_count(); 2];
-        let window = windows.get(chunks.value(row) as usize).filter(fits);
-        let window = window.ok_or_else(|| damaged("a chunk does not fit its grid"))?;
-        let numbers = steps.values().iter().zip(milliseconds.values());
-        for (cell, (steps, milliseconds)) in window.cell_indices(&grid).zip(numbers) {
-            counts.steps[cell] = *steps;
-            counts.milliseconds[cell] = *milliseconds;
+
+    fn steps(&mut self, steps: &[u32]) {
+        for some in steps.chunks(HASHED_AT_ONCE) {
+            let bytes: Vec<u8> = some.iter().flat_map(|n| n.to_le_bytes()).collect();
+            self.0.update(&bytes);
         }
     }
-    if key.vouches() == Vouched::Values(counts.digest()) {
-        Ok(counts)
-    } else {
-        Err(damaged("its numbers are not those of its name"))
+
+    fn milliseconds(&mut self, milliseconds: &[i64]) {
+        for some in milliseconds.chunks(HASHED_AT_ONCE) {
+            let bytes: Vec<u8> = some.iter().flat_map(|n| n.to_le_bytes()).collect();
+            self.0.update(&bytes);
+        }
+    }
+
+    fn finish(self) -> Digest {
+        Digest::from_bytes(self.0.finalize().into())
     }
 }
 
 /// Has an object these numbers that its name says?
 pub(crate) fn check(key: &ObjectKey, content: Bytes) -> Result<(), StorageError> {
-    decode(key, content, None).map(|_counts| ())
+    Reader::of(key, &content.into(), None).map(|_reader| ())
 }
 
 /// Reads stored counts, which must be those that their name says.
@@ -206,7 +156,8 @@ pub async fn read(
     key: &ObjectKey,
     grid: &Grid,
 ) -> Result<Contributed, StorageError> {
-    decode(key, store.get(key).await?, Some(grid))
+    let mut reader = Reader::open(store, key, grid).await?;
+    off_thread(move || reader.rows(reader.row_count())).await
 }
 
 /// Stores counts under the digest of their numbers.
@@ -216,20 +167,22 @@ pub async fn write(
     grid: &Grid,
     counts: &Contributed,
 ) -> Result<ObjectKey, StorageError> {
-    let cell_count = grid.cell_count();
-    if [counts.steps.len(), counts.milliseconds.len()] != [cell_count; 2] {
-        let reason = format!("{} cells, its grid has {cell_count}", counts.steps.len());
-        return Err(StorageError::damaged("counts to write", reason));
-    }
-    let key = ObjectKey::contributed(product, &counts.digest());
-    store.put_new(&key, encode(grid, counts)?).await?;
-    Ok(key)
+    let folder = FOLDER.as_path();
+    let mut spooled = Spooled::one_of(1, folder, grid, (counts.period, counts.of_steps))?;
+    spooled.band(counts)?;
+    spooled
+        .put(store, product)
+        .await
+        .map(|(key, _complete)| key)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::parquet_table;
+    use arrow::array::RecordBatch;
     use arrow::compute::concat_batches;
+    use contract::chunk::field_chunks;
 
     const GRID: Grid = Grid {
         rows: 70,
@@ -298,19 +251,53 @@ mod tests {
         let mut counts = Contributed::nothing(&GRID, january.start);
         counts.add(january, &has_data);
         let key = ObjectKey::contributed(&"p".parse().unwrap(), &counts.digest());
-        let content = encode(&GRID, &counts).unwrap();
+        let mut writer = writer::Writer::new(vec![], &GRID, (counts.period, 1)).unwrap();
+        writer.band(&counts).unwrap();
+        let content = writer.finish().unwrap().into();
         let whole = parquet_table::decode(&key, content, &SCHEMA).unwrap().batch;
         let without = whole.slice(0, whole.num_rows() - 1);
         let twice = concat_batches(&SCHEMA, [&whole, &whole.slice(0, 1)]).unwrap();
         let read = |batch: &RecordBatch| {
             let shape = [GRID.rows, GRID.cols];
             let content = parquet_table::encode(batch, CHUNKS_PER_GROUP, &shape).unwrap();
-            decode(&key, content, Some(&GRID))
+            Reader::of(&key, &content.into(), Some(&GRID))?.rows(GRID.rows)
         };
         assert_eq!(read(&whole).unwrap(), counts);
-        for batch in [&without, &twice] {
+        // As many as there should be, one of them in the place of another.
+        let first = concat_batches(&SCHEMA, [&whole.slice(0, 1), &without]).unwrap();
+        for batch in [&without, &twice, &first] {
             let error = read(batch).unwrap_err().to_string();
             assert!(error.contains("other chunks"), "{error}");
         }
+    }
+
+    #[tokio::test]
+    async fn counts_have_the_same_bytes_in_whatever_bands_they_come_and_are_read() {
+        let (store, product) = (Store::memory(), "p".parse().unwrap());
+        let (counts, cols) = (counts(), GRID.cols as usize);
+        let key = write(&store, &product, &GRID, &counts).await.unwrap();
+        let other = Store::memory();
+        // What is put aside lies in a file.
+        let folder = FOLDER.as_path();
+        let head = (counts.period, counts.of_steps);
+        let mut spooled = Spooled::one_of(usize::MAX, folder, &GRID, head).unwrap();
+        let mut reader = Reader::open(&store, &key, &GRID).await.unwrap();
+        assert_eq!((reader.period(), reader.of_steps()), head);
+        for rows in [0..60usize, 60..70] {
+            let band = reader.rows(rows.len() as u32).unwrap();
+            let cells = rows.start * cols..rows.end * cols;
+            assert_eq!(band.steps, counts.steps[cells.clone()]);
+            assert_eq!(band.milliseconds, counts.milliseconds[cells]);
+            spooled.band(&band).unwrap();
+        }
+        assert!(reader.rows(1).is_err(), "there are no more");
+        let put = spooled.put(&other, &product).await.unwrap();
+        assert_eq!(put, (key.clone(), counts.complete_cells()));
+        assert_eq!(
+            other.get(&key).await.unwrap(),
+            store.get(&key).await.unwrap()
+        );
+        let few = Spooled::one_of(1, folder, &GRID, head).unwrap();
+        assert!(few.put(&other, &product).await.is_err(), "rows are missing");
     }
 }

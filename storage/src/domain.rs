@@ -76,6 +76,13 @@ impl Cells {
         }
     }
 
+    /// Adds others of the same map.
+    pub fn add(&mut self, others: &Self) {
+        for (word, other) in self.words.iter_mut().zip(&others.words) {
+            *word |= other;
+        }
+    }
+
     /// Takes others of the same map away.
     pub fn remove(&mut self, others: &Self) {
         for (word, other) in self.words.iter_mut().zip(&others.words) {
@@ -207,5 +214,10 @@ mod tests {
         assert!(cells.has(597) && !cells.has(600));
         rest.remove_valued(600, &[0.0; 400]);
         assert!(!rest.is_any());
+        let [mut first, mut second] = [Cells::none(1000), Cells::none(1000)];
+        first.add_valued(0, &(0..500).map(value).collect::<Vec<_>>());
+        second.add_valued(500, &(500..1000).map(value).collect::<Vec<_>>());
+        first.add(&second);
+        assert_eq!(write_cells(&store, &product, first).await.unwrap(), key);
     }
 }

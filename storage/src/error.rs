@@ -1,5 +1,7 @@
 //! What can go wrong between a service and its durable things.
 
+use std::path::PathBuf;
+
 use contract::key::ObjectKey;
 
 use crate::failure::Failure;
@@ -19,6 +21,12 @@ pub enum StorageError {
     /// A stored object does not hold what its kind must hold.
     #[error("{object} is damaged: {reason}")]
     Damaged { object: String, reason: String },
+    /// What is on its way to the store cannot be put aside: a full disk may be emptied.
+    #[error("cannot write to the spool {folder:?}: {source}")]
+    Spool {
+        folder: PathBuf,
+        source: std::io::Error,
+    },
     /// The place to store in cannot be used.
     #[error("cannot store in {location:?}: {reason}")]
     Location { location: String, reason: String },
@@ -39,7 +47,7 @@ impl StorageError {
     pub fn is_retryable(&self) -> bool {
         match self {
             Self::Object { source, .. } => may_pass(source),
-            Self::Log { .. } => true,
+            Self::Log { .. } | Self::Spool { .. } => true,
             Self::Conflict { .. }
             | Self::Damaged { .. }
             | Self::Location { .. }

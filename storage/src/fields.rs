@@ -5,6 +5,7 @@
 
 mod names;
 mod reader;
+mod spooled;
 mod writer;
 
 use std::sync::{Arc, LazyLock};
@@ -32,6 +33,7 @@ use crate::{Encoded, StorageError, Store};
 
 pub use names::settle;
 pub use reader::{Bands, Reader};
+pub use spooled::Spooled;
 pub use writer::Writer;
 
 /// Chunks a reader takes at once: small enough to spread a large field over partitions.
@@ -90,6 +92,26 @@ pub fn encode(grid: &Grid, values: &[f32], period: Period) -> Result<Encoded, St
 /// two files of one product may differ in their last digits.
 pub fn digest_of(grid: &Grid, values: &[f32], period: Period) -> Digest {
     digest_begun(grid, period).values(values).finish()
+}
+
+/// The same of a field whose values come some rows after the other.
+pub struct FieldDigest(ValuesDigest);
+
+impl FieldDigest {
+    /// Of a field of a period on a grid, before its values.
+    pub fn new(grid: &Grid, period: Period) -> Self {
+        Self(digest_begun(grid, period))
+    }
+
+    /// Adds the next rows.
+    pub fn add(&mut self, values: &[f32]) {
+        self.0.add(values);
+    }
+
+    /// The digest of all that were added.
+    pub fn finish(self) -> Digest {
+        self.0.finish()
+    }
 }
 
 /// The same before its values.
@@ -270,6 +292,21 @@ async fn read_by_bands(
         values.extend_from_slice(&band);
     }
     Ok((values, period))
+}
+
+/// The bands of a stored field, of at most so many cells: a field of one is read whole, as [`read`] does it.
+pub async fn bands(
+    store: &Store,
+    key: &ObjectKey,
+    grid: &Grid,
+    most_cells: u64,
+) -> Result<Bands, StorageError> {
+    let reader = if grid.cell_count() as u64 <= most_cells.min(WHOLE_CELLS) {
+        Reader::whole(store, key, grid).await?
+    } else {
+        Reader::open(store, key, Some(grid)).await?
+    };
+    Ok(reader.bands_of(most_cells))
 }
 
 /// Stores a field under the digest of its values.

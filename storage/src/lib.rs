@@ -21,6 +21,7 @@ mod parquet_table;
 pub mod row_check;
 pub mod rows;
 pub mod sound;
+pub mod spool;
 pub mod store;
 mod values;
 pub mod verify;

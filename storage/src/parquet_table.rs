@@ -5,8 +5,10 @@ use std::num::ParseIntError;
 use std::sync::Arc;
 
 use arrow::array::{Array as _, ArrayRef, ListArray, PrimitiveArray, RecordBatch};
+#[cfg(test)]
 use arrow::compute::concat_batches;
 use arrow::datatypes::{ArrowPrimitiveType, DataType, Field, SchemaRef};
+#[cfg(test)]
 use bytes::Bytes;
 use contract::grid::Grid;
 use contract::key::ObjectKey;
@@ -15,6 +17,7 @@ use parquet::arrow::arrow_reader::{ParquetRecordBatchReader, ParquetRecordBatchR
 use parquet::basic::{Compression, ZstdLevel};
 use parquet::file::metadata::{KeyValue, ParquetMetaData};
 use parquet::file::properties::{EnabledStatistics, WriterProperties, WriterPropertiesBuilder};
+use parquet::file::reader::ChunkReader;
 use parquet::schema::types::ColumnPath;
 use sha2::{Digest as _, Sha256};
 
@@ -30,6 +33,7 @@ const ROWS_AT_ONCE: usize = 1 << 10;
 const SHAPE: &str = "fluxglobe.shape";
 
 /// Bytes of a table; `rows_per_group` is how many rows share their entries in the footer, `shape` what its values lie on.
+#[cfg(test)]
 pub(crate) fn encode(
     batch: &RecordBatch,
     rows_per_group: usize,
@@ -39,6 +43,7 @@ pub(crate) fn encode(
 }
 
 /// The same as another version of the libraries, or of this program, might write it.
+#[cfg(test)]
 pub(crate) fn encode_as(
     batch: &RecordBatch,
     shape: &[u32],
@@ -58,6 +63,7 @@ pub(crate) fn encode_as(
 
 /// Groups of rows in, a sealed file out, written as they come: no more than a group is held.
 pub(crate) struct Writer<W: Write + Send> {
+    #[cfg(test)]
     rows_per_group: usize,
     rows: ArrowWriter<Sealing<W>>,
 }
@@ -82,10 +88,12 @@ impl<W: Write + Send> Writer<W> {
         let shape: Vec<String> = shape.iter().map(ToString::to_string).collect();
         let shape = KeyValue::new(SHAPE.to_owned(), shape.join(" "));
         let properties = properties.set_key_value_metadata(Some(vec![shape])).build();
+        #[cfg(test)]
         let rows_per_group = properties.max_row_group_row_count().unwrap_or(usize::MAX);
         let out = Sealing::Pages(out, Sha256::new());
         let rows = ArrowWriter::try_new(out, Arc::clone(schema), Some(properties));
         Ok(Self {
+            #[cfg(test)]
             rows_per_group,
             rows: rows.map_err(unwritten)?,
         })
@@ -159,10 +167,10 @@ impl<W: Write> Write for Sealing<W> {
     }
 }
 
-/// A table that was read, and what its values lie on: nothing where the file does not say.
+/// A table that was read.
+#[cfg(test)]
 pub(crate) struct Table {
     pub(crate) batch: RecordBatch,
-    pub(crate) shape: Vec<u32>,
 }
 
 /// The item of a list of values: f32, never null; NaN is no data.
@@ -208,20 +216,21 @@ fn properties(schema: &SchemaRef, rows_per_group: usize) -> WriterPropertiesBuil
 }
 
 /// The table in some bytes, which must have this schema.
+#[cfg(test)]
 pub(crate) fn decode(
     key: &ObjectKey,
     content: Bytes,
     schema: &SchemaRef,
 ) -> Result<Table, StorageError> {
     let damaged = |e: &dyn std::fmt::Display| damage::found(key, e);
-    let Opened { shape, batches, .. } = open(key, content)?;
+    let Opened { batches, .. } = open(key, content)?;
     let batches: Vec<RecordBatch> = batches.collect::<Result<_, _>>().map_err(|e| damaged(&e))?;
     let found = batches.first().map(RecordBatch::schema);
     if found.is_some_and(|found| found.fields() != schema.fields()) {
         return Err(damaged(&"its columns are others"));
     }
     let batch = concat_batches(schema, &batches).map_err(|e| damaged(&e))?;
-    Ok(Table { batch, shape })
+    Ok(Table { batch })
 }
 
 /// A table whose rows are still to be read.
@@ -235,12 +244,24 @@ pub(crate) struct Opened {
 }
 
 /// The table in some bytes, row by row.
-pub(crate) fn open(key: &ObjectKey, content: Bytes) -> Result<Opened, StorageError> {
+pub(crate) fn open(
+    key: &ObjectKey,
+    content: impl ChunkReader + 'static,
+) -> Result<Opened, StorageError> {
+    open_in(key, content, ROWS_AT_ONCE)
+}
+
+/// The same, so many rows decoded together.
+pub(crate) fn open_in(
+    key: &ObjectKey,
+    content: impl ChunkReader + 'static,
+    rows_at_once: usize,
+) -> Result<Opened, StorageError> {
     let damaged = |e: &dyn std::fmt::Display| damage::found(key, e);
     let builder = ParquetRecordBatchReaderBuilder::try_new(content).map_err(|e| damaged(&e))?;
     let shape = shape_of(builder.metadata()).map_err(|e| damaged(&e))?;
     let rows = builder.metadata().file_metadata().num_rows();
-    let batches = builder.with_batch_size(ROWS_AT_ONCE).build();
+    let batches = builder.with_batch_size(rows_at_once).build();
     Ok(Opened {
         shape,
         row_count: rows.unsigned_abs(),

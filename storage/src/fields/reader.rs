@@ -59,34 +59,59 @@ impl Reader {
         key: &ObjectKey,
         grid: Option<&Grid>,
     ) -> Result<Self, StorageError> {
-        let stored = Stored {
-            objects: store.object_store(),
-            path: Path::from(key.as_str()),
-            key: key.clone(),
-        };
+        let stored = stored(store, key);
+        match Self::rows_of(stored.clone(), grid).await? {
+            Some(reader) => Ok(reader),
+            None => Self::held(store, stored, grid).await,
+        }
+    }
+
+    /// The same of a field that somebody else finds, of a grid.
+    ///
+    /// # Errors
+    /// As of [`Reader::open`]; it is of before rows had checks.
+    pub async fn of_rows(stored: Stored, grid: &Grid) -> Result<Self, StorageError> {
+        let key = stored.key.clone();
+        let found = Self::rows_of(stored, Some(grid)).await?;
+        let old = "it is of before its rows had checks, and is not read in parts";
+        found.ok_or_else(|| StorageError::damaged(key.as_str(), old))
+    }
+
+    /// None where rows have no checks.
+    async fn rows_of(stored: Stored, grid: Option<&Grid>) -> Result<Option<Self>, StorageError> {
+        let key = stored.key.clone();
         let index = RowIndex::read(&stored).await?;
         let of_file = index.as_ref().and_then(|index| of_file(index.metadata()));
         let (Some(index), Some((shape, period)), Vouched::Values(name)) =
             (index, of_file, key.vouches())
         else {
-            return Self::held(store, stored, grid).await;
+            return Ok(None);
         };
         let own = grid.copied().unwrap_or(shape);
         if (own.rows, own.cols) != (shape.rows, shape.cols) {
-            return Err(damage::found(key, super::other_grid(&shape, &own)));
+            return Err(damage::found(&key, super::other_grid(&shape, &own)));
         }
-        check_count(&own, index.row_count()).map_err(|reason| damage::found(key, reason))?;
+        check_count(&own, index.row_count()).map_err(|reason| damage::found(&key, reason))?;
         let source = Source::Rows {
             index: Arc::new(index),
             chunks: field_chunks(&own).into(),
             name,
         };
-        Ok(Self {
+        Ok(Some(Self {
             stored,
             grid: own,
             period,
             source,
-        })
+        }))
+    }
+
+    /// Reads all of a field at once, compared with its name: for those that are small.
+    pub(super) async fn whole(
+        store: &Store,
+        key: &ObjectKey,
+        grid: &Grid,
+    ) -> Result<Self, StorageError> {
+        Self::held(store, stored(store, key), Some(grid)).await
     }
 
     async fn held(
@@ -218,6 +243,15 @@ impl Bands {
         .await?;
         self.check = Some((digest, name));
         Ok(Some((rows, values)))
+    }
+}
+
+/// Where a field lies.
+fn stored(store: &Store, key: &ObjectKey) -> Stored {
+    Stored {
+        objects: store.object_store(),
+        path: Path::from(key.as_str()),
+        key: key.clone(),
     }
 }
 

@@ -1,20 +1,29 @@
-//! Where the bytes of a field are written: memory while they are few, a file without a name when they are many.
+//! Where bytes lie that are on their way to the store: memory while they are few, a file without a name when they are many.
 
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, LazyLock, Mutex, PoisonError};
 
-use storage::content::Content;
 use tempfile::{SpooledData, SpooledTempFile, spooled_tempfile_in};
 
-use crate::error::IngestError;
+use crate::StorageError;
+use crate::content::Content;
 
-/// Bytes of a field that are held; those of a larger one lie in a file, which ends with the process.
-pub(crate) const HELD_BYTES: u64 = 32 << 20;
+/// Bytes that are held; those of what is larger lie in a file, which ends with the process.
+pub const HELD_BYTES: u64 = 32 << 20;
+/// Where such files lie when nobody said where: on a disk, where `/tmp` may be memory, unless nothing can be written there.
+pub static FOLDER: LazyLock<PathBuf> = LazyLock::new(|| {
+    let disk = PathBuf::from("/var/tmp");
+    if tempfile::tempfile_in(&disk).is_ok() {
+        disk
+    } else {
+        std::env::temp_dir()
+    }
+});
 
 /// Bytes that are being written; clones write to the same place.
 #[derive(Debug, Clone)]
-pub(super) struct Spool {
+pub struct Spool {
     folder: PathBuf,
     inner: Arc<Mutex<Inner>>,
 }
@@ -26,9 +35,15 @@ struct Inner {
 }
 
 impl Spool {
-    pub(super) fn new(folder: &Path) -> Self {
+    /// One whose file, if it needs one, lies in a folder.
+    pub fn new(folder: &Path) -> Self {
+        Self::holding(folder, HELD_BYTES)
+    }
+
+    /// The same of which so many bytes are held: where several are written at a time.
+    pub fn holding(folder: &Path, held_bytes: u64) -> Self {
         let inner = Inner {
-            file: spooled_tempfile_in(HELD_BYTES as usize, folder),
+            file: spooled_tempfile_in(usize::try_from(held_bytes).unwrap_or(usize::MAX), folder),
             failure: None,
         };
         Self {
@@ -37,14 +52,22 @@ impl Spool {
         }
     }
 
-    /// Why something could not be written, if that was so.
-    pub(super) fn failure(&self) -> Option<IngestError> {
+    /// Why something could not be written, if that was so; it is told once.
+    pub fn failure(&self) -> Option<StorageError> {
         let source = self.with(|inner| inner.failure.take())?;
         Some(self.failed(source))
     }
 
+    /// What failed with an error: the spool where it could not be written, which is no fault of what was.
+    pub fn or_failure(&self, error: StorageError) -> StorageError {
+        self.failure().unwrap_or(error)
+    }
+
     /// What was written.
-    pub(super) fn into_content(self) -> Result<Content, IngestError> {
+    ///
+    /// # Errors
+    /// Its file cannot be asked how large it is.
+    pub fn into_content(self) -> Result<Content, StorageError> {
         let folder = &self.folder;
         let empty = || spooled_tempfile_in(0, folder);
         let file = self.with(|inner| std::mem::replace(&mut inner.file, empty()));
@@ -54,15 +77,15 @@ impl Spool {
         }
     }
 
-    fn failed(&self, source: io::Error) -> IngestError {
-        IngestError::Spool {
+    fn failed(&self, source: io::Error) -> StorageError {
+        StorageError::Spool {
             folder: self.folder.clone(),
             source,
         }
     }
 
     fn with<T>(&self, work: impl FnOnce(&mut Inner) -> T) -> T {
-        // Whoever panicked while writing gives no field out.
+        // Whoever panicked while writing gives nothing out.
         work(&mut self.inner.lock().unwrap_or_else(PoisonError::into_inner))
     }
 }
@@ -113,7 +136,7 @@ mod tests {
         let written = spool.write_all(&vec![7; HELD_BYTES as usize + 1]);
         assert!(written.is_err());
         let failure = spool.failure().unwrap();
-        assert!(matches!(failure, IngestError::Spool { .. }), "{failure}");
-        assert!(spool.failure().is_none());
+        assert!(matches!(failure, StorageError::Spool { .. }), "{failure}");
+        assert!(failure.is_retryable() && spool.failure().is_none());
     }
 }
