@@ -9,6 +9,7 @@ mod dependents;
 pub(crate) mod job;
 pub(crate) mod make;
 mod matched;
+mod read;
 mod request;
 mod work;
 
@@ -16,15 +17,17 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 use contract::computed::{Computation, Computed, ComputedInput};
 use contract::digest::Digest;
+use contract::grid::Grid;
 use contract::manifest::{MANIFEST_SCHEMA, Manifest, Step};
 use contract::masked::MaskedCells;
 use contract::product::ProductId;
 use futures::future::BoxFuture;
+use storage::domain::Cells;
 use storage::{StorageError, domain, manifests};
 
 use crate::expression::unit::Unit;
 use crate::functions::{COMPUTED_EXTENT, COMPUTED_FIELD};
-use crate::{ComputeError, DeriveProgress, Engine, catalogue, held};
+use crate::{ComputeError, DeriveProgress, Engine, catalogue};
 use job::{ExtentMade, ExtentTask, FieldMade, FieldTask, Job};
 use make::Maker;
 use matched::{Input, Matched, Matches};
@@ -34,6 +37,8 @@ pub use request::{Request, RequestedInput};
 const METHOD: u32 = 1;
 /// Values that a task looks through for the cells that hold data: 256 MiB of f32, whatever the grid.
 const RUN_VALUES: usize = 64 << 20;
+/// Steps that it looks through at the least: what it finds is a byte a cell in the store until clean-up.
+const LEAST_RUN: usize = 16;
 /// Steps that are asked of the engine at a time, so that progress is told.
 const STEPS_AT_A_TIME: usize = 1024;
 /// How often the commit is tried again when another writer takes the number.
@@ -64,7 +69,6 @@ pub fn compute<'a>(
 ) -> BoxFuture<'a, Result<Outcome, ComputeError>> {
     Box::pin(async move {
         let plan = Plan::of(engine, request).await?;
-        held::check(&plan.job.target_grid, "a computed product")?;
         let latest = manifests::latest(engine.store(), &request.target).await?;
         if let Some(latest) = &latest {
             fits_what_is_there(latest, &plan.job)?;
@@ -265,7 +269,7 @@ impl Plan {
         engine: &Engine,
         steps: &[Step],
     ) -> Result<contract::key::ObjectKey, ComputeError> {
-        let per_run = (RUN_VALUES / self.job.target_grid.cell_count()).max(1);
+        let per_run = (RUN_VALUES / self.job.target_grid.cell_count()).max(LEAST_RUN);
         let task = |(index, run): (usize, &[Step])| ExtentTask {
             first: index * per_run,
             fields: run.iter().map(|step| step.field.clone()).collect(),
@@ -275,17 +279,14 @@ impl Plan {
         let mut made: Vec<ExtentMade> =
             work::on_engine(engine, COMPUTED_EXTENT, &self.job, &tasks).await?;
         made.sort_by_key(|made| made.first);
-        let mut cells = vec![false; self.job.target_grid.cell_count()];
+        let mut cells = Cells::none(self.job.target_grid.cell_count());
         for (made, task) in made.iter().zip(&tasks) {
             if made.first != task.first {
                 return Err(not_asked());
             }
-            let of_run = domain::read(engine.store(), &made.domain).await?;
-            for (cell, held) in cells.iter_mut().zip(of_run) {
-                *cell |= held;
-            }
+            cells.add(&domain::read_cells(engine.store(), &made.domain).await?);
         }
-        Ok(domain::write(engine.store(), &self.job.target, &cells).await?)
+        Ok(domain::write_cells(engine.store(), &self.job.target, cells).await?)
     }
 
     fn manifest(
@@ -345,6 +346,10 @@ fn check(job: &Job) -> Result<(), ComputeError> {
                     "the expression comes to {unit}, but {:?} is stored in {wanted}",
                     job.quantity
                 ));
+            }
+            let shape = |grid: &Grid| (grid.rows, grid.cols);
+            if shape(&job.grid) != shape(&job.target_grid) {
+                return refused("an expression has the grid of its inputs".to_owned());
             }
             Ok(())
         }

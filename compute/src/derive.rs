@@ -2,6 +2,7 @@
 //! product in, a statistic of each of its cells out.
 
 mod at_cell;
+mod carried;
 mod derivation;
 pub(crate) mod exact;
 mod prior;
@@ -18,7 +19,8 @@ use contract::time::{Period, TimeMs};
 use futures::future::BoxFuture;
 use storage::{StorageError, Store, manifests};
 
-use crate::{ComputeError, Engine, catalogue, held};
+use crate::workshop::Workshop;
+use crate::{ComputeError, Engine, catalogue};
 pub(crate) use at_cell::counts_at_cell;
 use derivation::Derivation;
 use source::{SourceStep, steps_since};
@@ -96,10 +98,22 @@ async fn derive(
     prior: Option<&Manifest>,
     progress: &Progress<'_>,
 ) -> Result<Manifest, ComputeError> {
-    held::check(&source.grid, "accumulated carbon of every cell")?;
+    let workshop = Workshop::of(engine.store());
+    let derived = accumulated((engine, workshop), source, steps, prior, progress).await?;
+    commit(engine, source, derived).await
+}
+
+/// Computes and stores everything but the manifest, which is returned with number 0.
+async fn accumulated(
+    on: (&Engine, Workshop<'_>),
+    source: &Manifest,
+    steps: &[SourceStep<'_>],
+    prior: Option<&Manifest>,
+    progress: &Progress<'_>,
+) -> Result<Manifest, ComputeError> {
     let target = source.product.accumulated()?;
-    let derivation = Derivation::begin(engine, source, &target, steps, prior).await?;
-    commit(engine, source, derivation.finish(progress).await?).await
+    let derivation = Derivation::begin(on, source, &target, steps, prior).await?;
+    derivation.finish(progress).await
 }
 
 /// The newest version of a product that is a flux of carbon.
@@ -222,3 +236,6 @@ fn is_no_older(latest: &Manifest, source: &Manifest, derived: &Manifest) -> bool
     };
     is_newer || *latest == same
 }
+
+#[cfg(test)]
+mod tests;

@@ -45,10 +45,11 @@ impl Owner for Computed {
 }
 
 /// The state of accumulation that the next step goes on from.
-fn exact_sums(manifest: &Manifest) -> Option<ObjectKey> {
-    let last = manifest.steps.last()?;
+fn exact_sums(manifest: &Manifest) -> Vec<ObjectKey> {
     let is_accumulated = manifest.quantity == Quantity::AccumulatedCarbon;
-    is_accumulated.then(|| exact::key(last.raw_sha256))
+    let last = manifest.steps.last().filter(|_| is_accumulated);
+    let keys = last.map(|last| exact::keys(last.raw_sha256, &manifest.grid));
+    keys.into_iter().flatten().collect()
 }
 
 /// Stored sums of the named regions.

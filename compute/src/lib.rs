@@ -18,10 +18,11 @@ mod failure;
 pub mod flight_sql;
 pub mod functions;
 pub mod gc;
-mod held;
 pub mod matchup;
 mod objects;
 mod open_versions;
+#[cfg(test)]
+mod peak;
 pub mod point;
 pub mod published;
 pub mod recompute;
@@ -38,6 +39,7 @@ mod state;
 pub mod stats;
 mod step_range;
 mod tail_store;
+mod workshop;
 
 pub use budget::budget;
 pub use check::compare;

@@ -1,20 +1,23 @@
 //! Where queries read objects: SQL's scans by address, and our functions the weights that they sum with.
 
 use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use bytes::Bytes;
+use contract::chunk::{BAND_CELLS, bands};
 use contract::digest::Digest;
 use contract::key::ObjectKey;
 use contract::manifest::ManifestId;
 use datafusion::error::DataFusionError;
 use datafusion::execution::runtime_env::RuntimeEnv;
-use object_store::path::Path;
+use object_store::path::Path as ObjectPath;
 use object_store::{ObjectStore, ObjectStoreExt as _};
 use quick_cache::Weighter;
 use quick_cache::sync::Cache;
+use storage::fields::Reader;
 use storage::rows::{RowIndex, Stored};
-use storage::{StorageError, Store, manifests};
+use storage::{StorageError, Store, manifests, spool};
 use tokio::sync::Semaphore;
 use url::{Position, Url};
 
@@ -24,6 +27,7 @@ use crate::reduce::remembered::Remembered;
 use crate::region::computed::ComputedWeights;
 use crate::region::extent::Extent;
 use crate::region::loaded::{LoadedWeights, RegionWeights};
+use crate::region::shares::Weighing;
 use crate::retry_store::RetryStore;
 use crate::tail_store::TailStore;
 
@@ -34,7 +38,7 @@ pub struct Objects {
     store: Arc<dyn ObjectStore>,
     weights: Arc<LoadedWeights>,
     /// Where rows lie in files that were read, by their path.
-    row_indexes: Arc<Cache<Path, Option<Arc<RowIndex>>, ByRows>>,
+    row_indexes: Arc<Cache<ObjectPath, Option<Arc<RowIndex>>, ByRows>>,
     extents: Arc<Cache<Digest, Extent>>,
     sums: Arc<Remembered>,
     open_versions: Arc<OpenVersions>,
@@ -53,8 +57,8 @@ const HELD_EXTENTS: usize = 1000;
 #[derive(Debug, Clone)]
 struct ByRows;
 
-impl Weighter<Path, Option<Arc<RowIndex>>> for ByRows {
-    fn weight(&self, _at: &Path, index: &Option<Arc<RowIndex>>) -> u64 {
+impl Weighter<ObjectPath, Option<Arc<RowIndex>>> for ByRows {
+    fn weight(&self, _at: &ObjectPath, index: &Option<Arc<RowIndex>>) -> u64 {
         index.as_ref().map_or(1, |index| index.row_count().max(1))
     }
 }
@@ -64,6 +68,8 @@ impl Weighter<Path, Option<Arc<RowIndex>>> for ByRows {
 pub(crate) struct Storing {
     pub(crate) store: Store,
     pub(crate) turns: Arc<Semaphore>,
+    /// Where fields lie that are too large to be held on their way to the store.
+    pub(crate) spool: PathBuf,
 }
 
 impl std::fmt::Debug for Storing {
@@ -86,11 +92,21 @@ impl Objects {
         let storing = Storing {
             store: store.clone(),
             turns: Arc::new(Semaphore::new(turns)),
+            spool: spool::FOLDER.clone(),
         };
         Self {
             storing: Some(storing),
             ..self
         }
+    }
+
+    /// The same, whose large fields lie in a folder on their way to the store.
+    #[must_use]
+    pub fn spooling(mut self, folder: &Path) -> Self {
+        if let Some(storing) = &mut self.storing {
+            folder.clone_into(&mut storing.spool);
+        }
+        self
     }
 
     /// Where functions that compute products store them.
@@ -143,6 +159,9 @@ impl Objects {
     }
 
     async fn computed(&self, question: ComputedWeights) -> Result<RegionWeights, DataFusionError> {
+        if question.grid.cell_count() as u64 > BAND_CELLS {
+            return self.computed_in_bands(question).await;
+        }
         let shares = match (question.surface.shares(), &question.shares_at) {
             (Some(shares), Some(address)) => {
                 let content = self.content(address).await?;
@@ -157,13 +176,48 @@ impl Objects {
         chunks.map(RegionWeights::new).map_err(external)
     }
 
+    /// The same on a grid of which no map is held whole.
+    async fn computed_in_bands(
+        &self,
+        question: ComputedWeights,
+    ) -> Result<RegionWeights, DataFusionError> {
+        let computing = move || match question.to_weigh() {
+            Ok(Some(chunks)) => Ok((question, chunks, true)),
+            Ok(None) => question
+                .chunks(None)
+                .map(|chunks| (question, chunks, false)),
+            Err(e) => Err(e),
+        };
+        let computed = tokio::task::spawn_blocking(computing).await;
+        let computed = computed.map_err(|e| DataFusionError::External(e.into()))?;
+        let (question, chunks, is_weighed) = computed.map_err(external)?;
+        let (true, Some(shares), Some(address)) =
+            (is_weighed, question.surface.shares(), &question.shares_at)
+        else {
+            return Ok(RegionWeights::new(chunks));
+        };
+        let unread = |e: StorageError| DataFusionError::External(e.into());
+        let stored = self.stored(&shares.field, address).map_err(external)?;
+        let reader = Reader::of_rows(stored, &question.grid)
+            .await
+            .map_err(unread)?;
+        let mut weighing = Weighing::new(shares, &question.grid, &chunks);
+        for rows in bands(&question.grid, BAND_CELLS) {
+            if weighing.needs(&rows) {
+                let values = reader.rows(rows.clone()).await.map_err(unread)?;
+                weighing.band(rows, &values).map_err(external)?;
+            }
+        }
+        weighing.finish().map(RegionWeights::new).map_err(external)
+    }
+
     async fn content(&self, address: &str) -> Result<Bytes, DataFusionError> {
         let path = self.path(address)?;
         Ok(self.store.get(&path).await?.bytes().await?)
     }
 
     /// Where an address leads in the store.
-    fn path(&self, address: &str) -> Result<Path, DataFusionError> {
+    fn path(&self, address: &str) -> Result<ObjectPath, DataFusionError> {
         let elsewhere = || {
             let root = &self.root;
             DataFusionError::Execution(format!("{address} is not in the store at {root}"))
@@ -172,7 +226,7 @@ impl Objects {
         if url[..Position::BeforePath] != self.root[..Position::BeforePath] {
             return Err(elsewhere());
         }
-        Path::from_url_path(url.path()).map_err(|_no_path| elsewhere())
+        ObjectPath::from_url_path(url.path()).map_err(|_no_path| elsewhere())
     }
 
     /// An object whose rows are read, by its address.

@@ -11,6 +11,8 @@
 
 pub mod axis;
 
+use std::ops::Range;
+
 use contract::computed::Regridding;
 use contract::grid::Grid;
 
@@ -70,32 +72,99 @@ impl Regridder {
         if values.len() != self.source_cells {
             return None;
         }
-        let cells = self
-            .rows
-            .iter()
-            .flat_map(|row| self.cols.iter().map(move |col| (row, col)));
-        let (values, coverage) = cells.map(|(row, col)| self.cell(values, row, col)).unzip();
-        Some(Regridded { values, coverage })
-    }
-
-    fn cell(&self, values: &[f32], row: &Parts, col: &Parts) -> (f64, f64) {
-        let (mut sum, mut covered) = (0.0, 0.0);
-        for &(source_row, row_weight) in &row.parts {
-            let start = source_row as usize * self.source_cols;
-            for &(source_col, col_weight) in &col.parts {
-                let value = values[start + source_col as usize];
-                if !value.is_nan() {
-                    let weight = row_weight * col_weight;
-                    sum += f64::from(value) * weight;
-                    covered += weight;
-                }
+        let mut out = Regridded {
+            values: vec![],
+            coverage: vec![],
+        };
+        let source_rows = u32::try_from(self.source_cells / self.source_cols.max(1)).ok()?;
+        for row in 0..self.rows.len() {
+            let mut row = self.row(row);
+            row.take(0..source_rows, values);
+            for (value, coverage) in row.finish() {
+                out.values.push(value);
+                out.coverage.push(coverage);
             }
         }
-        if covered > 0.0 {
-            (sum / covered, covered / (row.whole * col.whole))
-        } else {
-            (f64::NAN, 0.0)
+        Some(out)
+    }
+
+    /// One row of the target, still without values.
+    ///
+    /// # Panics
+    /// The target has no such row.
+    pub fn row(&self, row: usize) -> TargetRow<'_> {
+        TargetRow {
+            regridder: self,
+            row: &self.rows[row],
+            taken: 0,
+            sums: vec![(0.0, 0.0); self.cols.len()],
         }
+    }
+
+    /// Of every row of the target the first row of the source that it or one further south is made of.
+    pub fn first_rows(&self) -> Vec<u32> {
+        let mut first = u32::MAX;
+        let mut of_row = |row: &Parts| {
+            let own = row.parts.first().map_or(u32::MAX, |(row, _)| *row);
+            first = first.min(own);
+            first
+        };
+        let mut rows: Vec<u32> = self.rows.iter().rev().map(&mut of_row).collect();
+        rows.reverse();
+        rows
+    }
+}
+
+/// A row of the target that is being made: rows of the source in, from the north to the south, values out.
+#[derive(Debug)]
+pub struct TargetRow<'a> {
+    regridder: &'a Regridder,
+    row: &'a Parts,
+    /// Rows of the source that are in it already.
+    taken: usize,
+    /// By column, of values times weight and of weights.
+    sums: Vec<(f64, f64)>,
+}
+
+impl TargetRow<'_> {
+    /// The next row of the source that it needs; none if it is complete.
+    pub fn next_row(&self) -> Option<u32> {
+        self.row.parts.get(self.taken).map(|(row, _)| *row)
+    }
+
+    /// Takes what it needs of some rows of the source, `[row, col]`, which begin no further south than the next one.
+    pub fn take(&mut self, rows: Range<u32>, values: &[f32]) {
+        let cols = self.regridder.source_cols;
+        while let Some(&(row, row_weight)) = self.row.parts.get(self.taken) {
+            if !rows.contains(&row) {
+                break;
+            }
+            let start = (row - rows.start) as usize * cols;
+            let source = &values[start..start + cols];
+            for (col, (sum, covered)) in self.regridder.cols.iter().zip(&mut self.sums) {
+                for &(source_col, col_weight) in &col.parts {
+                    let value = source[source_col as usize];
+                    if !value.is_nan() {
+                        let weight = row_weight * col_weight;
+                        *sum += f64::from(value) * weight;
+                        *covered += weight;
+                    }
+                }
+            }
+            self.taken += 1;
+        }
+    }
+
+    /// Value and coverage of its cells: NaN where no data covers one.
+    pub fn finish(self) -> impl Iterator<Item = (f64, f64)> {
+        let cells = self.sums.into_iter().zip(&self.regridder.cols);
+        cells.map(move |((sum, covered), col)| {
+            if covered > 0.0 {
+                (sum / covered, covered / (self.row.whole * col.whole))
+            } else {
+                (f64::NAN, 0.0)
+            }
+        })
     }
 }
 

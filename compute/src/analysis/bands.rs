@@ -171,6 +171,31 @@ impl Bands {
         sums
     }
 
+    /// Area of those cells of each band that are some of the grid's, by row and column, m²: what sums of a field over them have,
+    /// to the bit.
+    pub fn areas_m2(&self, has: impl Fn(u32, u32) -> bool) -> Vec<f64> {
+        let windows = self.windows();
+        let mut areas_m2 = vec![0.0; self.edges_deg.len()];
+        for row in self.rows.clone() {
+            let area_m2 = self.area_m2[row as usize];
+            let cols = windows.iter().flat_map(|own| own.col..own.col + own.cols);
+            for col in cols.filter(|col| has(row, *col)) {
+                if let Some(band) = self.band_at(row, col) {
+                    areas_m2[band] += area_m2;
+                }
+            }
+        }
+        areas_m2
+    }
+
+    fn band_at(&self, row: u32, col: u32) -> Option<usize> {
+        let at = match self.along {
+            Along::Lat => row,
+            Along::Lon => col,
+        };
+        self.band_of[at as usize]
+    }
+
     /// Hands over the band, the value and the area of each cell that has a value in a band, row by row.
     fn each(&self, windows: &[Window], values: &[Vec<f32>], mut take: impl FnMut(usize, f64, f64)) {
         for row in self.rows.clone() {
@@ -178,15 +203,11 @@ impl Bands {
             for (window, values) in windows.iter().zip(values) {
                 let start = (row - window.row) as usize * window.cols as usize;
                 let cells = &values[start..start + window.cols as usize];
-                for (col, value) in (window.col as usize..).zip(cells) {
+                for (col, value) in (window.col..).zip(cells) {
                     if value.is_nan() {
                         continue;
                     }
-                    let at = match self.along {
-                        Along::Lat => row as usize,
-                        Along::Lon => col,
-                    };
-                    if let Some(band) = self.band_of[at] {
+                    if let Some(band) = self.band_at(row, col) {
                         take(band, f64::from(*value), area_m2);
                     }
                 }
@@ -282,6 +303,25 @@ mod tests {
             (BandSum::default().mean(), BandSum::default().std()),
             (None, None)
         );
+    }
+
+    #[test]
+    fn areas_of_cells_are_those_of_sums_over_them_to_the_bit() {
+        let values: Vec<f32> = (0..24)
+            .map(|i| if i % 5 == 3 { f32::NAN } else { 1.0 })
+            .collect();
+        for along in [Along::Lat, Along::Lon] {
+            let bounds = [178.0, -2.0, 182.0, 1.0];
+            let bands = Bands::of(&GRID, along, 1.0, bounds, Earth::Wgs84);
+            let expected: Vec<f64> = sums(&bands, &values)
+                .iter()
+                .map(|sum| sum.area_m2)
+                .collect();
+            let found = bands.areas_m2(|row, col| (row * 6 + col) % 5 != 3);
+            assert!(expected.len() > 2 && expected.iter().all(|area| *area > 0.0));
+            let bits = |areas: &[f64]| areas.iter().map(|area| area.to_bits()).collect::<Vec<_>>();
+            assert_eq!(bits(&found), bits(&expected), "{along:?}");
+        }
     }
 
     #[test]

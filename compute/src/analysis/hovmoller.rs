@@ -4,7 +4,6 @@ use std::sync::Arc;
 
 use contract::ContractError;
 use contract::analysis::{Along, Hovmoller, HovmollerBand, HovmollerQuery, HovmollerRow};
-use contract::chunk::Window;
 use contract::cited::Cited;
 use contract::grid::Grid;
 use contract::manifest::{Manifest, Step};
@@ -161,20 +160,16 @@ async fn domain_areas(
     manifest: &Manifest,
     bands: &Bands,
 ) -> Result<Vec<f64>, ComputeError> {
-    let cells = domain::read(store, &manifest.domain).await?;
-    if cells.len() != manifest.grid.cell_count() {
+    let cells = domain::read_cells(store, &manifest.domain).await?;
+    if cells.map_count() != manifest.grid.cell_count() {
         let what = manifest.domain.to_string();
         return Err(ComputeError::inconsistent(
             what,
             "it does not fill its product's grid",
         ));
     }
-    let windows = bands.windows();
-    let one = |cell: usize| if cells[cell] { 1.0 } else { f32::NAN };
-    let ones = |window: &Window| window.cell_indices(&manifest.grid).map(one).collect();
-    let ones: Vec<Vec<f32>> = windows.iter().map(ones).collect();
-    let sums = bands.sums(&windows, &ones);
-    Ok(sums.iter().map(|sum| sum.area_m2).collect())
+    let cols = manifest.grid.cols as usize;
+    Ok(bands.areas_m2(|row, col| cells.has(row as usize * cols + col as usize)))
 }
 
 /// Sums of each bin and band, by area and seconds, with squares where they are asked for.

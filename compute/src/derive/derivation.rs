@@ -1,82 +1,97 @@
 //! One derivation: kept steps and new ones in the order of time, exact sums from one run of steps to the next.
 
+use contract::key::ObjectKey;
 use contract::manifest::{Contributed, MANIFEST_SCHEMA, Manifest, Step};
 use contract::product::ProductId;
 use contract::quantity::Quantity;
-use storage::contributed::{self, Contributed as Counts};
-use storage::{Store, domain, fields};
+use storage::contributed::{self, Reader};
+use storage::domain::{self, Cells};
+use storage::fields;
 
+use super::carried::{Carried, CarriedBand};
 use super::prior::Prior;
 use super::source::SourceStep;
-use super::steps::{accumulate_segment, sums_after};
+use super::steps::{Band, accumulate_segment, sums_after};
 use super::{Progress, exact, of_all};
+use crate::workshop::Workshop;
 use crate::{ComputeError, Engine};
-use contract::key::ObjectKey;
 
-/// Values of one query: 256 MiB of f32, whatever the grid.
-const RUN_VALUES: usize = 64 << 20;
-
-/// A derivation under way. Its result is the same, bit for bit, whatever could be kept.
+/// A derivation under way. Its result is the same, bit for bit, whatever could be kept and in whatever bands it is worked on.
 pub(super) struct Derivation<'a> {
     engine: &'a Engine,
+    workshop: Workshop<'a>,
     source: &'a Manifest,
     target: &'a ProductId,
     steps: &'a [SourceStep<'a>],
     domain: ObjectKey,
-    /// `[row, col]`.
-    cells: Vec<bool>,
+    cells: Cells,
     prior: Prior<'a>,
-    /// Exact sums after the steps so far, from the first one on that is not kept.
-    sums: Vec<i64>,
-    /// Steps and time that they hold.
-    counts: Counts,
+    /// Exact sums after the steps so far, from the first one on that is not kept, and what they hold.
+    carried: Carried,
     done: Vec<Step>,
 }
 
 impl<'a> Derivation<'a> {
     /// Finds out what of the newest manifest can be kept, and the exact sums at its end.
     pub(super) async fn begin(
-        engine: &'a Engine,
+        (engine, workshop): (&'a Engine, Workshop<'a>),
         source: &'a Manifest,
         target: &'a ProductId,
         steps: &'a [SourceStep<'a>],
         latest: Option<&'a Manifest>,
     ) -> Result<Self, ComputeError> {
-        let (store, grid) = (engine.store(), &source.grid);
-        let cells = domain::read(store, &source.domain).await?;
-        if cells.len() != grid.cell_count() {
+        let (store, grid) = (workshop.store, &source.grid);
+        let cells = domain::read_cells(store, &source.domain).await?;
+        if cells.map_count() != grid.cell_count() {
             return Err(ComputeError::inconsistent(
                 source.domain.to_string(),
                 "it does not fill its product's grid",
             ));
         }
-        let domain = domain::write(store, target, &cells).await?;
+        let domain = domain::write_cells(store, target, cells.clone()).await?;
         let mut prior = Prior::of(store, latest, grid, steps, &domain).await?;
-        let counts = prior.contributed(store, grid, steps).await?;
-        let kept = &steps[..prior.step_count];
-        let sums = match kept.last() {
-            // With everything kept nobody asks for the sums.
-            Some(last) if kept.len() < steps.len() => {
-                match exact::kept(store, last.made_of, grid.cell_count()).await? {
-                    Some(sums) => sums,
-                    None => sums_after(engine, grid, kept).await?,
-                }
-            }
-            _ => vec![0; grid.cell_count()],
-        };
-        tracing::debug!(product = %target, kept = kept.len(), steps = steps.len(), "accumulating");
-        Ok(Self {
+        let counts = prior.contributed(store, grid).await?;
+        let start = steps.first().map(|step| step.period.start);
+        let start = start.expect("there is a step to accumulate");
+        let mut begun = Self {
             engine,
+            workshop,
             source,
             target,
             steps,
             domain,
             cells,
+            carried: Carried::nothing(workshop, grid, start)?,
             prior,
-            sums,
-            counts,
             done: vec![],
-        })
+        };
+        // With everything kept nobody asks for the sums.
+        if let Some(counts) = counts.filter(|_| begun.prior.step_count < steps.len()) {
+            begun.go_on_from(counts).await?;
+        }
+        let kept = begun.prior.step_count;
+        tracing::debug!(product = %target, kept, steps = steps.len(), "accumulating");
+        Ok(begun)
+    }
+
+    /// Finds the exact sums after the last kept step; `counts` are what they hold.
+    async fn go_on_from(&mut self, mut counts: Reader) -> Result<(), ComputeError> {
+        let (grid, kept) = (&self.source.grid, &self.steps[..self.prior.step_count]);
+        let Some(last) = kept.last() else {
+            return Ok(());
+        };
+        for (index, rows) in self.carried.bands().to_vec().into_iter().enumerate() {
+            let key = exact::key(last.made_of, grid, &rows);
+            let counts = counts.rows(rows.len() as u32)?;
+            let cell_count = counts.steps.len();
+            let sums = match exact::kept(self.workshop.store, &key, cell_count).await? {
+                Some(sums) => sums,
+                None => sums_after(self.engine, &Band::new(grid, &rows), kept).await?,
+            };
+            let band = CarriedBand { sums, counts };
+            self.carried.put(index, band, self.workshop.spool)?;
+        }
+        Ok(())
     }
 
     /// Computes and stores everything but the manifest, which is returned with number 0.
@@ -84,17 +99,13 @@ impl<'a> Derivation<'a> {
         mut self,
         progress: &Progress<'_>,
     ) -> Result<Manifest, ComputeError> {
-        let per_run = (RUN_VALUES / self.source.grid.cell_count()).max(1);
+        let cells = self.source.grid.cell_count() as u64;
+        let held = cells.min(self.workshop.band_cells).max(1);
+        let per_run = (self.workshop.run_values / held).max(1) as usize;
         for run in self.steps.chunks(per_run) {
             self.run(run, progress).await?;
         }
-        if let Some(last) = self
-            .steps
-            .last()
-            .filter(|_| self.prior.step_count < self.steps.len())
-        {
-            exact::keep(self.store(), last.made_of, &self.sums).await?;
-        }
+        self.keep_sums().await?;
         Ok(Manifest {
             schema: MANIFEST_SCHEMA,
             product: self.target.clone(),
@@ -113,8 +124,18 @@ impl<'a> Derivation<'a> {
         })
     }
 
-    fn store(&self) -> &'a Store {
-        self.engine.store()
+    /// Stores the exact sums after the last step, if they are not those that were kept.
+    async fn keep_sums(&mut self) -> Result<(), ComputeError> {
+        let is_new = self.prior.step_count < self.steps.len();
+        let Some(last) = self.steps.last().filter(|_| is_new) else {
+            return Ok(());
+        };
+        for (index, rows) in self.carried.bands().to_vec().into_iter().enumerate() {
+            let key = exact::key(last.made_of, &self.source.grid, &rows);
+            let band = self.carried.take(index, self.workshop.spool)?;
+            exact::keep(self.workshop.store, &key, &band.sums).await?;
+        }
+        Ok(())
     }
 
     /// One run of steps.
@@ -124,86 +145,82 @@ impl<'a> Derivation<'a> {
         progress: &Progress<'_>,
     ) -> Result<(), ComputeError> {
         let first = self.done.len();
-        let kept = (first..first + run.len()).map_while(|index| self.prior.step(index));
-        let kept: Vec<Step> = kept.cloned().collect();
-        if kept.len() == run.len() {
-            self.done.extend(kept);
+        let kept_count = self.prior.step_count.saturating_sub(first).min(run.len());
+        for (index, step) in (first..).zip(&run[..kept_count]) {
+            let kept = if let Some(kept) = self.prior.step(index) {
+                kept.clone()
+            } else {
+                let over = (index, &self.cells);
+                let field = self.prior.over(self.workshop, self.target, over).await?;
+                stored(step, field, self.prior.counts(index).cloned())
+            };
+            self.done.push(kept);
             progress(of_all(self.done.len(), self.steps));
+        }
+        let rest = &run[kept_count..];
+        if rest.is_empty() {
             return Ok(());
         }
-        let (columns, has_data) = self.columns(first, run).await?;
-        let kept_count = run.len() - has_data.len();
-        for (index, (step, values)) in run.iter().zip(&columns).enumerate() {
-            let contributed = match index.checked_sub(kept_count) {
-                Some(new) => self.counted(step, &has_data[new]).await?,
-                None => self.prior.counts(first + index).cloned(),
+        for (step, written) in rest.iter().zip(self.accumulated(rest).await?) {
+            let store = self.workshop.store;
+            let field = written.field.put(store, self.target).await?;
+            let (counts, complete_cells) = written.counts.put(store, self.target).await?;
+            let contributed = Contributed {
+                counts,
+                complete_cells,
             };
-            let step = match self.prior.step(first + index) {
-                Some(kept) => kept.clone(),
-                None => self.stored(step, values, contributed).await?,
-            };
-            self.done.push(step);
+            self.done.push(stored(step, field, Some(contributed)));
             progress(of_all(self.done.len(), self.steps));
         }
         Ok(())
     }
 
-    /// Values of every step of a run that is stored anew, `[row, col]` each: read where they are kept over another domain, else
-    /// accumulated; and of those that are accumulated the cells with data.
-    async fn columns(
-        &mut self,
-        first: usize,
-        run: &[SourceStep<'_>],
-    ) -> Result<(Vec<Vec<f32>>, Vec<Vec<bool>>), ComputeError> {
-        let kept_count = self.prior.step_count.saturating_sub(first).min(run.len());
-        let mut columns = vec![];
-        for index in first..first + kept_count {
-            columns.push(match self.prior.step(index) {
-                // Its field is kept as it is.
-                Some(_step) => vec![],
-                None => self.prior.column(self.store(), index, &self.cells).await?,
-            });
+    /// Accumulates steps band by band; fields and counts of each, still to be stored.
+    async fn accumulated(&mut self, run: &[SourceStep<'_>]) -> Result<Vec<Written>, ComputeError> {
+        let (grid, workshop) = (&self.source.grid, self.workshop);
+        let mut written: Vec<Written> = vec![];
+        for (index, rows) in self.carried.bands().to_vec().into_iter().enumerate() {
+            let mut own = self.carried.take(index, workshop.spool)?;
+            let band = Band::new(grid, &rows);
+            let made = accumulate_segment(self.engine, &band, run, &self.cells, &own.sums).await?;
+            for (at, step) in run.iter().enumerate() {
+                own.counts.add(step.period, &made.has_data[at]);
+                if written.len() == at {
+                    let head = (own.counts.period, own.counts.of_steps);
+                    let folder = workshop.spool;
+                    written.push(Written {
+                        field: fields::Spooled::one_of(run.len(), folder, grid, step.period)?,
+                        counts: contributed::Spooled::one_of(run.len(), folder, grid, head)?,
+                    });
+                }
+                written[at].field.band(&made.columns[at])?;
+                written[at].counts.band(&own.counts)?;
+            }
+            own.sums = made.after;
+            self.carried.put(index, own, workshop.spool)?;
         }
-        let rest = &run[kept_count..];
-        if rest.is_empty() {
-            return Ok((columns, vec![]));
-        }
-        let grid = &self.source.grid;
-        let new = accumulate_segment(self.engine, grid, rest, &self.cells, &self.sums).await?;
-        columns.extend(new.columns);
-        self.sums = new.after;
-        Ok((columns, new.has_data))
+        Ok(written)
     }
+}
 
-    /// Counts a step in and stores what the sums hold after it.
-    async fn counted(
-        &mut self,
-        step: &SourceStep<'_>,
-        has_data: &[bool],
-    ) -> Result<Option<Contributed>, ComputeError> {
-        self.counts.add(step.period, has_data);
-        let (store, grid, counts) = (self.store(), &self.source.grid, &self.counts);
-        Ok(Some(Contributed {
-            counts: contributed::write(store, self.target, grid, counts).await?,
-            complete_cells: counts.complete_cells(),
-        }))
-    }
+/// What is made of a step, before it is stored.
+struct Written {
+    field: fields::Spooled,
+    counts: contributed::Spooled,
+}
 
-    async fn stored(
-        &self,
-        step: &SourceStep<'_>,
-        values: &[f32],
-        contributed: Option<Contributed>,
-    ) -> Result<Step, ComputeError> {
-        let (store, grid) = (self.store(), &self.source.grid);
-        Ok(Step {
-            masked: None,
-            period: step.period,
-            field: fields::write(store, self.target, grid, values, step.period).await?,
-            raw_sha256: step.made_of,
-            origin: format!("accumulated up to {}", step.step.origin),
-            valid_cells: values.iter().filter(|value| !value.is_nan()).count() as u64,
-            contributed,
-        })
+fn stored(
+    step: &SourceStep<'_>,
+    (field, valid_cells): (ObjectKey, u64),
+    contributed: Option<Contributed>,
+) -> Step {
+    Step {
+        masked: None,
+        period: step.period,
+        field,
+        raw_sha256: step.made_of,
+        origin: format!("accumulated up to {}", step.step.origin),
+        valid_cells,
+        contributed,
     }
 }

@@ -3,19 +3,22 @@
 use contract::grid::Grid;
 use contract::key::ObjectKey;
 use contract::manifest::{self, Manifest, Step};
-use storage::contributed::{self, Contributed};
-use storage::{Store, domain, fields};
+use contract::product::ProductId;
+use storage::domain::Cells;
+use storage::fields::Spooled;
+use storage::{Store, contributed, domain, fields};
 
 use super::source::SourceStep;
 use crate::ComputeError;
+use crate::workshop::Workshop;
 
 /// The reusable part of the newest manifest.
 pub(super) struct Prior<'a> {
     manifest: Option<&'a Manifest>,
     /// How many of its first steps are made of what they would be made of now.
     pub(super) step_count: usize,
-    /// Its domain where that is another one now; `[row, col]`.
-    other_domain: Option<Vec<bool>>,
+    /// Its domain where that is another one now.
+    other_domain: Option<Cells>,
 }
 
 impl<'a> Prior<'a> {
@@ -47,7 +50,7 @@ impl<'a> Prior<'a> {
         let other_domain = if latest.domain == *domain_now {
             None
         } else {
-            Some(domain::read(store, &latest.domain).await?)
+            Some(domain::read_cells(store, &latest.domain).await?)
         };
         Ok(Self {
             manifest: Some(latest),
@@ -56,18 +59,17 @@ impl<'a> Prior<'a> {
         })
     }
 
-    /// What the sums after the last kept step hold; nothing before the first step, if none is kept. If the object is
+    /// What the sums after the last kept step hold; none before the first step, if none is kept. If the object is
     /// gone, nothing is kept any more.
     pub(super) async fn contributed(
         &mut self,
         store: &Store,
         grid: &Grid,
-        steps: &[SourceStep<'_>],
-    ) -> Result<Contributed, ComputeError> {
+    ) -> Result<Option<contributed::Reader>, ComputeError> {
         let last = self.step_count.checked_sub(1);
         if let Some(counts) = last.and_then(|last| self.counts(last)) {
-            match contributed::read(store, &counts.counts, grid).await {
-                Ok(contributed) => return Ok(contributed),
+            match contributed::Reader::open(store, &counts.counts, grid).await {
+                Ok(reader) => return Ok(Some(reader)),
                 Err(e) if e.is_not_found() => {
                     let key = &counts.counts;
                     tracing::warn!(%key, "counts of steps are gone; all is accumulated again");
@@ -76,9 +78,7 @@ impl<'a> Prior<'a> {
             }
         }
         *self = Self::nothing();
-        let start = steps.first().map(|step| step.period.start);
-        let start = start.expect("there is a step to accumulate");
-        Ok(Contributed::nothing(grid, start))
+        Ok(None)
     }
 
     /// What the sums after a kept step hold: it does not depend on the domain, for a cell that comes or goes had no data.
@@ -93,27 +93,34 @@ impl<'a> Prior<'a> {
         (index < self.step_count).then(|| &manifest.steps[index])
     }
 
-    /// Values of a kept step as they are over the domain of now, `[row, col]`.
+    /// A kept step as it is over the domain of now: the key of its field, and how many cells hold a value.
     ///
     /// No kept step has data in a cell that only one of the two domains has: if the old one lacks it, no old step had
     /// data there; if the new one lacks it, no step has now. So such a cell has accumulated exactly nothing, or is empty.
-    pub(super) async fn column(
+    pub(super) async fn over(
         &self,
-        store: &Store,
-        index: usize,
-        domain_now: &[bool],
-    ) -> Result<Vec<f32>, ComputeError> {
+        workshop: Workshop<'_>,
+        target: &ProductId,
+        (index, domain_now): (usize, &Cells),
+    ) -> Result<(ObjectKey, u64), ComputeError> {
         let manifest = self.manifest.expect("kept steps have a manifest");
-        let mut values = fields::read(store, &manifest.steps[index].field, &manifest.grid).await?;
-        if let Some(before) = &self.other_domain {
-            for ((value, &now), &before) in values.iter_mut().zip(domain_now).zip(before) {
-                if !now {
-                    *value = f32::NAN;
-                } else if !before {
-                    *value = 0.0;
+        let (step, grid) = (&manifest.steps[index], &manifest.grid);
+        let mut field = Spooled::begin(workshop.spool, grid, step.period)?;
+        let band_cells = workshop.band_cells;
+        let mut bands = fields::bands(workshop.store, &step.field, grid, band_cells).await?;
+        while let Some((rows, mut values)) = bands.next().await? {
+            if let Some(before) = &self.other_domain {
+                let first = rows.start as usize * grid.cols as usize;
+                for (cell, value) in (first..).zip(&mut values) {
+                    if !domain_now.has(cell) {
+                        *value = f32::NAN;
+                    } else if !before.has(cell) {
+                        *value = 0.0;
+                    }
                 }
             }
+            field.band(&values)?;
         }
-        Ok(values)
+        Ok(field.put(workshop.store, target).await?)
     }
 }

@@ -20,6 +20,7 @@ use super::lists::{Argument, check_types};
 use crate::computed::job::Job;
 use crate::computed::make::{self, Maker};
 use crate::objects::{Objects, Storing};
+use crate::workshop::Workshop;
 
 /// Of a step.
 pub(crate) const FIELD: &str = "computed_field";
@@ -90,16 +91,20 @@ impl AsyncScalarUDFImpl for Computed {
 impl Computed {
     async fn one(&self, storing: &Storing, job: &Job, maker: &Maker, task: &str) -> Result<String> {
         let external = |e: crate::ComputeError| DataFusionError::External(e.into());
-        // Whole maps are held: not more of them than there are processors.
+        // Bands of maps are held: not more of them than there are processors.
         let turn = storing.turns.acquire().await;
         let _turn = turn.map_err(|closed| DataFusionError::External(closed.into()))?;
+        let workshop = Workshop {
+            spool: &storing.spool,
+            ..Workshop::of(&storing.store)
+        };
         if self.name == SERIES {
             let task = read(task)?;
-            let made = make::run(&storing.store, job, &task).await;
+            let made = make::run(workshop, job, &task).await;
             text(&made.map_err(external)?)
         } else {
             let task = read(task)?;
-            let made = make::field(&storing.store, job, maker, &task).await;
+            let made = make::field(workshop, job, maker, &task).await;
             text(&made.map_err(external)?)
         }
     }

@@ -1,7 +1,5 @@
 //! Weights of cells as whole numbers: how much of each the geometry has, and how much of that coverage counts.
 
-use std::collections::BTreeSet;
-
 use contract::chunk::{CHUNK_COLS, CHUNK_ROWS, Window, field_chunks};
 use contract::earth::Earth;
 use contract::grid::Grid;
@@ -14,6 +12,7 @@ use crate::region::loaded::RegionWeights;
 
 /// Shares of a cell below this are counted in steps of their own largest one: a sliver in one cell has a mean too.
 const SLIVER: f64 = 1.0 / 65_536.0;
+const WORD_BITS: usize = 64;
 
 /// That of areas: of the grid's largest cell, so that whole cells have the same weight in every region.
 pub(super) fn unit_of_areas(grid: &Grid, earth: Earth, weights: &RegionWeights) -> WeightUnit {
@@ -164,26 +163,27 @@ impl Cells<'_> {
         }
     }
 
-    /// Numbers of the blocks that hold weight, increasing.
+    /// Numbers of the blocks that hold weight, increasing; a bit a block is held to find them.
     pub(super) fn blocks(&self) -> Vec<u32> {
-        let across = self.shape[1].div_ceil(BLOCK_CELLS);
+        let [down, across] = self.shape.map(|cells| cells.div_ceil(BLOCK_CELLS));
+        let mut held = vec![0u64; (down as usize * across as usize).div_ceil(WORD_BITS)];
         let windows = chunks(self.shape);
-        let mut found = BTreeSet::new();
         for (chunk, weights) in self.whole.chunks() {
             let window = windows[chunk as usize];
             let rows = weights.chunks_exact(window.cols as usize);
             for (row, weights) in (window.row..).zip(rows) {
-                let mut last = None;
+                let first = row as usize / BLOCK_CELLS as usize * across as usize;
                 for (col, _) in (window.col..).zip(weights).filter(|(_, w)| **w > 0.0) {
-                    let block = row / BLOCK_CELLS * across + col / BLOCK_CELLS;
-                    if last != Some(block) {
-                        found.insert(block);
-                        last = Some(block);
-                    }
+                    let block = first + (col / BLOCK_CELLS) as usize;
+                    held[block / WORD_BITS] |= 1 << (block % WORD_BITS);
                 }
             }
         }
-        found.into_iter().collect()
+        let bits = held.iter().enumerate().flat_map(|(word, bits)| {
+            let own = (0..WORD_BITS).filter(move |bit| bits >> bit & 1 == 1);
+            own.map(move |bit| (word * WORD_BITS + bit) as u32)
+        });
+        bits.collect()
     }
 }
 

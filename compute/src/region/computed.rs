@@ -74,6 +74,17 @@ impl ComputedWeights {
         Err(ComputeError::Region { reason })
     }
 
+    /// Areas of all of a region, m², by chunk, where those of its sea come of shares that are read band by band; none if this is
+    /// no region of such.
+    pub(crate) fn to_weigh(&self) -> Result<Option<Vec<(u32, SharedAreas)>>, ComputeError> {
+        let (Geometry::Region(region), Some(_)) = (&self.geometry, self.surface.shares()) else {
+            return Ok(None);
+        };
+        self.check_size()?;
+        let all = Surface::All;
+        shared_of(&self.grid, region, self.earth, &all, None).map(Some)
+    }
+
     /// Areas of a region's share of every cell, m², lengths of a line's, m, or shares of a place, by chunk; `shares` is `[row, col]`, where the surface needs them.
     pub(crate) fn chunks(
         &self,

@@ -8,9 +8,10 @@ use contract::manifest::Manifest;
 use contract::product::ProductId;
 use contract::region::{AskedRegion, MAX_CORNERS, MAX_REGIONS, Polygon, Region};
 use futures::future::BoxFuture;
-use storage::Store;
+use storage::{Store, fields};
 
 use crate::ComputeError;
+use crate::workshop::Workshop;
 
 /// Codes that are named where the one asked for is not there.
 const NAMED_CODES: usize = 20;
@@ -32,8 +33,15 @@ pub fn region<'a>(
     code: f32,
 ) -> BoxFuture<'a, Result<AskedRegion, ComputeError>> {
     Box::pin(async move {
-        let values = map(store, mask).await?;
-        of_code(mask, &values, code)
+        let (mut traced, mut codes) = (Traced::of(code), Codes::default());
+        let workshop = Workshop::of(store);
+        each_row(workshop, mask, |row, values| {
+            traced.row(&mask.grid, row, values);
+            codes.add(values);
+            Ok(())
+        })
+        .await?;
+        traced.region(mask, || codes.text())
     })
 }
 
@@ -46,31 +54,38 @@ pub fn regions<'a>(
     mask: &'a Manifest,
 ) -> BoxFuture<'a, Result<Vec<AskedRegion>, ComputeError>> {
     Box::pin(async move {
-        let values = map(store, mask).await?;
-        let mut codes: Vec<f32> = vec![];
-        for value in values.iter().filter(|value| !value.is_nan()) {
-            if let Err(at) = codes.binary_search_by(|code| code.total_cmp(value)) {
-                codes.insert(at, *value);
+        let mut all: Vec<Traced> = vec![];
+        let workshop = Workshop::of(store);
+        each_row(workshop, mask, |row, values| {
+            for value in values.iter().filter(|value| !value.is_nan()) {
+                if let Err(at) = all.binary_search_by(|own| own.code.total_cmp(value)) {
+                    all.insert(at, Traced::of(*value));
+                }
+                if all.len() > MAX_REGIONS {
+                    let reason = format!("it has more than {MAX_REGIONS} codes");
+                    return Err(refused(mask, &reason));
+                }
             }
-            if codes.len() > MAX_REGIONS {
-                return Err(refused(
-                    mask,
-                    &format!("it has more than {MAX_REGIONS} codes"),
-                ));
+            for traced in &mut all {
+                traced.row(&mask.grid, row, values);
             }
-        }
-        if codes.is_empty() {
+            Ok(())
+        })
+        .await?;
+        if all.is_empty() {
             return Err(refused(mask, "no cell has a code"));
         }
-        codes
-            .iter()
-            .map(|code| of_code(mask, &values, *code))
-            .collect()
+        let all = all.into_iter();
+        all.map(|traced| traced.region(mask, String::new)).collect()
     })
 }
 
-/// The one map of a mask, `[row, col]`.
-async fn map(store: &Store, mask: &Manifest) -> Result<Vec<f32>, ComputeError> {
+/// Hands over the rows of the one map of a mask, north to south.
+async fn each_row(
+    workshop: Workshop<'_>,
+    mask: &Manifest,
+    mut take: impl FnMut(u32, &[f32]) -> Result<(), ComputeError>,
+) -> Result<(), ComputeError> {
     let [step] = &mask.steps[..] else {
         let count = mask.steps.len();
         return Err(refused(
@@ -78,7 +93,14 @@ async fn map(store: &Store, mask: &Manifest) -> Result<Vec<f32>, ComputeError> {
             &format!("the product has {count} steps; a mask is one map"),
         ));
     };
-    Ok(storage::fields::read(store, &step.field, &mask.grid).await?)
+    let (store, band_cells) = (workshop.store, workshop.band_cells);
+    let mut bands = fields::bands(store, &step.field, &mask.grid, band_cells).await?;
+    while let Some((rows, values)) = bands.next().await? {
+        for (row, values) in rows.zip(values.chunks_exact(mask.grid.cols as usize)) {
+            take(row, values)?;
+        }
+    }
+    Ok(())
 }
 
 fn refused(mask: &Manifest, reason: &str) -> ComputeError {
@@ -87,67 +109,80 @@ fn refused(mask: &Manifest, reason: &str) -> ComputeError {
     }
 }
 
-fn of_code(mask: &Manifest, values: &[f32], code: f32) -> Result<AskedRegion, ComputeError> {
-    let refused = |reason: String| {
-        Err(ComputeError::Region {
-            reason: format!("{}:{code}: {reason}", mask.product),
-        })
-    };
-    let rectangles = rectangles(&mask.grid, values, code);
-    if rectangles.is_empty() {
-        return refused(format!(
-            "no cell has this code; there are {}",
-            codes(values)
-        ));
-    }
-    if rectangles.len() * 4 > MAX_CORNERS {
-        let count = rectangles.len();
-        return refused(format!(
-            "its cells are {count} rectangles, at most {} are taken; give a coarser mask, or polygons",
-            MAX_CORNERS / 4
-        ));
-    }
-    Ok(AskedRegion {
-        region: Region::Polygons(rectangles),
-        name: format!("{}:{code}", mask.id()),
-    })
+/// Runs of cells with a code, each joined with the same run of the rows below; none wider than half a turn.
+struct Traced {
+    code: f32,
+    /// Columns of a run, and the row where it begins.
+    open: BTreeMap<(usize, usize), u32>,
+    /// As many as are taken, and one.
+    found: Vec<Polygon>,
+    count: usize,
 }
 
-/// Runs of cells with the code, each joined with the same run of the rows below; none wider than half a turn.
-#[expect(clippy::float_cmp, reason = "a code is one exact number")]
-fn rectangles(grid: &Grid, values: &[f32], code: f32) -> Vec<Polygon> {
-    let cols = grid.cols as usize;
-    let mut found = vec![];
-    // Columns of a run, and the row where it begins.
-    let mut open: BTreeMap<(usize, usize), u32> = BTreeMap::new();
-    let mut close = |(first, end): (usize, usize), top: u32, bottom: u32| {
-        let [west, east] = [first, end].map(|col| grid.col_west_deg(col as u32));
-        let [north, south] = [top, bottom].map(|row| grid.row_north_deg(row));
-        found.push(Polygon {
-            outer: vec![[west, south], [east, south], [east, north], [west, north]],
-            holes: vec![],
-        });
-    };
-    for row in 0..=grid.rows {
-        let start = row as usize * cols;
-        let runs: BTreeSet<(usize, usize)> = match values.get(start..start + cols) {
-            Some(row) => runs(row, |value| value == code),
-            None => BTreeSet::new(),
-        };
-        let ended: Vec<_> = open
-            .iter()
-            .filter(|(run, _)| !runs.contains(run))
-            .map(|(run, top)| (*run, *top))
-            .collect();
-        for (run, top) in ended {
-            open.remove(&run);
-            close(run, top, row);
-        }
-        for run in runs {
-            open.entry(run).or_insert(row);
+impl Traced {
+    fn of(code: f32) -> Self {
+        Self {
+            code,
+            open: BTreeMap::new(),
+            found: vec![],
+            count: 0,
         }
     }
-    found
+
+    /// Takes the next row.
+    #[expect(clippy::float_cmp, reason = "a code is one exact number")]
+    fn row(&mut self, grid: &Grid, row: u32, values: &[f32]) {
+        let runs = runs(values, |value| value == self.code);
+        self.close(grid, row, |run| !runs.contains(run));
+        for run in runs {
+            self.open.entry(run).or_insert(row);
+        }
+    }
+
+    /// Ends some of the runs above a row.
+    fn close(&mut self, grid: &Grid, row: u32, is_ended: impl Fn(&(usize, usize)) -> bool) {
+        for ((first, end), top) in self.open.extract_if(.., |run, _| is_ended(run)) {
+            self.count += 1;
+            if self.found.len() * 4 > MAX_CORNERS {
+                continue;
+            }
+            let [west, east] = [first, end].map(|col| grid.col_west_deg(col as u32));
+            let [north, south] = [top, row].map(|row| grid.row_north_deg(row));
+            self.found.push(Polygon {
+                outer: vec![[west, south], [east, south], [east, north], [west, north]],
+                holes: vec![],
+            });
+        }
+    }
+
+    /// The region of all rows; `codes` are those that there are.
+    fn region(
+        mut self,
+        mask: &Manifest,
+        codes: impl FnOnce() -> String,
+    ) -> Result<AskedRegion, ComputeError> {
+        self.close(&mask.grid, mask.grid.rows, |_run| true);
+        let code = self.code;
+        let refused = |reason: String| {
+            Err(ComputeError::Region {
+                reason: format!("{}:{code}: {reason}", mask.product),
+            })
+        };
+        if self.count == 0 {
+            return refused(format!("no cell has this code; there are {}", codes()));
+        }
+        if self.count * 4 > MAX_CORNERS {
+            let count = self.count;
+            return refused(format!(
+                "its cells are {count} rectangles, at most {} are taken; give a coarser mask, or polygons",
+                MAX_CORNERS / 4
+            ));
+        }
+        Ok(AskedRegion {
+            region: Region::Polygons(self.found),
+            name: format!("{}:{code}", mask.id()),
+        })
+    }
 }
 
 /// First column and the one after the last of each run, cut in the middle of the row.
@@ -168,16 +203,27 @@ fn runs(row: &[f32], is_in: impl Fn(f32) -> bool) -> BTreeSet<(usize, usize)> {
 }
 
 /// The numbers of a mask, as far as they fit a line.
-fn codes(values: &[f32]) -> String {
-    let mut all = BTreeMap::new();
-    for value in values.iter().filter(|value| !value.is_nan()) {
-        all.insert(i64::from(value.to_bits().cast_signed()), *value);
-        if all.len() > NAMED_CODES {
-            return format!("more than {NAMED_CODES} others");
+#[derive(Default)]
+struct Codes(BTreeMap<i64, f32>);
+
+impl Codes {
+    fn add(&mut self, values: &[f32]) {
+        for value in values.iter().filter(|value| !value.is_nan()) {
+            if self.0.len() > NAMED_CODES {
+                return;
+            }
+            self.0
+                .insert(i64::from(value.to_bits().cast_signed()), *value);
         }
     }
-    let all: Vec<String> = all.values().map(ToString::to_string).collect();
-    all.join(", ")
+
+    fn text(&self) -> String {
+        if self.0.len() > NAMED_CODES {
+            return format!("more than {NAMED_CODES} others");
+        }
+        let all: Vec<String> = self.0.values().map(ToString::to_string).collect();
+        all.join(", ")
+    }
 }
 
 #[cfg(test)]
@@ -206,12 +252,21 @@ mod tests {
         values.to_vec()
     }
 
+    fn rectangles(values: &[f32], code: f32) -> Vec<Polygon> {
+        let mut traced = Traced::of(code);
+        for (row, values) in (0..).zip(values.chunks_exact(8)) {
+            traced.row(&GRID, row, values);
+        }
+        traced.close(&GRID, GRID.rows, |_run| true);
+        traced.found
+    }
+
     /// Area of a region against that of the cells, which are counted one by one.
     #[test]
     fn a_region_has_the_area_of_its_cells_and_no_other() {
         for code in [1.0, 2.0, 3.0] {
             let values = values();
-            let region = Region::Polygons(rectangles(&GRID, &values, code));
+            let region = Region::Polygons(rectangles(&values, code));
             let weights = crate::region::weights::compute(&GRID, &region, Earth::Wgs84).unwrap();
             let [(0, areas_m2)] = &weights[..] else {
                 panic!("one chunk holds all cells")
@@ -229,9 +284,13 @@ mod tests {
 
     #[test]
     fn runs_that_go_on_below_are_one_rectangle() {
-        assert_eq!(rectangles(&GRID, &values(), 2.0).len(), 3);
-        assert_eq!(rectangles(&GRID, &values(), 1.0).len(), 9);
-        assert_eq!(codes(&values()), "1, 2, 3");
+        assert_eq!(rectangles(&values(), 2.0).len(), 3);
+        assert_eq!(rectangles(&values(), 1.0).len(), 9);
+        let mut codes = Codes::default();
+        codes.add(&values());
+        assert_eq!(codes.text(), "1, 2, 3");
+        codes.add(&(4..30).map(|code| code as f32).collect::<Vec<_>>());
+        assert_eq!(codes.text(), "more than 20 others");
     }
 
     #[test]

@@ -1,6 +1,8 @@
 //! Shares of sea that a landed product says: how much of every cell is land, or sea, on the grid of what is summed.
 
-use contract::chunk::field_chunks;
+use std::ops::Range;
+
+use contract::chunk::{Window, field_chunks};
 use contract::grid::Grid;
 use contract::key::ObjectKey;
 use contract::manifest::Manifest;
@@ -86,31 +88,84 @@ impl Shares {
         chunks: &[(u32, SharedAreas)],
         values: &[f32],
     ) -> Result<Vec<(u32, SharedAreas)>, ComputeError> {
-        let windows = field_chunks(grid);
-        let (mut unknown, mut found) = (0u64, Found::default());
-        for (chunk, areas_m2) in chunks {
+        let mut weighing = Weighing::new(self, grid, chunks);
+        weighing.band(0..grid.rows, values)?;
+        weighing.finish()
+    }
+}
+
+/// The same of a map that comes in bands of rows, north to south.
+pub(crate) struct Weighing<'a> {
+    shares: &'a Shares,
+    grid: Grid,
+    windows: Vec<Window>,
+    /// Those of the region that are still to come.
+    chunks: &'a [(u32, SharedAreas)],
+    unknown: u64,
+    found: Found,
+}
+
+impl<'a> Weighing<'a> {
+    pub(crate) fn new(shares: &'a Shares, grid: &Grid, chunks: &'a [(u32, SharedAreas)]) -> Self {
+        Self {
+            shares,
+            grid: *grid,
+            windows: field_chunks(grid),
+            chunks,
+            unknown: 0,
+            found: Found::default(),
+        }
+    }
+
+    /// Has the region anything in some rows?
+    pub(crate) fn needs(&self, rows: &Range<u32>) -> bool {
+        let next = self.chunks.first();
+        next.is_some_and(|(chunk, _)| rows.contains(&self.windows[*chunk as usize].row))
+    }
+
+    /// Weighs the region's chunks in some rows: whole rows of chunks, `values` is `[row, col]` of them.
+    ///
+    /// # Errors
+    /// The weights take more memory than there is for them.
+    pub(crate) fn band(&mut self, rows: Range<u32>, values: &[f32]) -> Result<(), ComputeError> {
+        let cols = self.grid.cols as usize;
+        let first = rows.start as usize * cols;
+        while let Some(((chunk, areas_m2), rest)) = self.chunks.split_first() {
+            let window = self.windows[*chunk as usize];
+            if window.row >= rows.end {
+                break;
+            }
             let mut areas_m2 = areas_m2.to_vec();
-            let cells = windows[*chunk as usize].cell_indices(grid);
-            let areas = cells.zip(&mut areas_m2);
+            let areas = window.cell_indices(&self.grid).zip(&mut areas_m2);
             for (cell, area_m2) in areas.filter(|(_, area_m2)| **area_m2 > 0.0) {
-                let share = f64::from(values[cell]);
-                unknown += u64::from(share.is_nan());
-                *area_m2 *= match self.of {
+                let share = f64::from(values[cell - first]);
+                self.unknown += u64::from(share.is_nan());
+                *area_m2 *= match self.shares.of {
                     Of::Sea => share,
                     Of::Land => 1.0 - share,
                 };
             }
-            found.add(*chunk, &areas_m2)?;
+            self.found.add(*chunk, &areas_m2)?;
+            self.chunks = rest;
         }
+        Ok(())
+    }
+
+    /// The chunks with any sea.
+    ///
+    /// # Errors
+    /// `OceanShares` if a cell of the region has no share.
+    pub(crate) fn finish(self) -> Result<Vec<(u32, SharedAreas)>, ComputeError> {
+        let unknown = self.unknown;
         if unknown > 0 {
             return Err(ComputeError::OceanShares {
-                product: self.field.to_string(),
+                product: self.shares.field.to_string(),
                 reason: format!(
                     "{unknown} cells of the region have no value there; fill them with 0 or 1, or ask without it"
                 ),
             });
         }
-        Ok(found.chunks)
+        Ok(self.found.chunks)
     }
 }
 

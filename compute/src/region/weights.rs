@@ -8,7 +8,7 @@ use contract::key::ObjectKey;
 use contract::region::Region;
 use serde::{Deserialize, Serialize};
 use storage::weights::SharedAreas;
-use storage::{StorageError, Store};
+use storage::{StorageError, Store, fields};
 
 use super::box_cover::{self, Bounds};
 use super::found::Found;
@@ -16,8 +16,9 @@ use super::polygon_cover::Band;
 use super::ring::Ring;
 use super::rings::rings;
 use super::sea::sea;
-use super::shares::Shares;
-use crate::{ComputeError, held};
+use super::shares::{Shares, Weighing};
+use crate::ComputeError;
+use crate::workshop::Workshop;
 
 /// Version of the way weights of boxes are computed: it changes when their bits do.
 const BOX_METHOD: u32 = 1;
@@ -274,18 +275,8 @@ pub async fn stored_of(
         }
         Err(e) => return Err(e.into()),
     };
-    if surface.shares().is_some() {
-        held::check(grid, "the share of the sea from a product")?;
-    }
-    let values = match surface.shares() {
-        Some(shares) => Some(storage::fields::read(store, &shares.field, grid).await?),
-        None => None,
-    };
-    let (grid, region, own) = (*grid, region.clone(), surface.clone());
-    let cover = move || shared_of(&grid, &region, earth, &own, values.as_deref());
-    let chunks = tokio::task::spawn_blocking(cover)
-        .await
-        .map_err(|e| ComputeError::inconsistent("weights", e))??;
+    let workshop = Workshop::of(store);
+    let chunks = Box::pin(weighed(workshop, grid, region, earth, surface)).await?;
     if chunks.is_empty() && *surface == Surface::All {
         return Ok(None);
     }
@@ -295,6 +286,35 @@ pub async fn stored_of(
         storage::weights::write(store, &key, &chunks).await?;
     }
     Ok(Some(key))
+}
+
+/// Areas of a surface; shares that a product says are read band by band.
+async fn weighed(
+    workshop: Workshop<'_>,
+    grid: &Grid,
+    region: &Region,
+    earth: Earth,
+    surface: &Surface,
+) -> Result<Vec<(u32, SharedAreas)>, ComputeError> {
+    let covered = match surface {
+        Surface::Shares(_) => Surface::All,
+        own => own.clone(),
+    };
+    let (own, region) = (*grid, region.clone());
+    let cover = move || shared_of(&own, &region, earth, &covered, None);
+    let chunks = tokio::task::spawn_blocking(cover)
+        .await
+        .map_err(|e| ComputeError::inconsistent("weights", e))??;
+    let Surface::Shares(shares) = surface else {
+        return Ok(chunks);
+    };
+    let mut weighing = Weighing::new(shares, grid, &chunks);
+    let (store, band_cells) = (workshop.store, workshop.band_cells);
+    let mut bands = fields::bands(store, &shares.field, grid, band_cells).await?;
+    while let Some((rows, values)) = bands.next().await? {
+        weighing.band(rows, &values)?;
+    }
+    weighing.finish()
 }
 
 #[cfg(test)]

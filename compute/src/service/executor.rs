@@ -130,7 +130,7 @@ impl Executor {
                 address,
                 work: Arc::new(work),
                 gone,
-                objects: objects.storing(&store),
+                objects: objects.storing(&store).spooling(&settings.executor_work),
                 store,
                 channel,
                 work_bytes,

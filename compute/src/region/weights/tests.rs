@@ -336,3 +336,29 @@ proptest! {
         }
     }
 }
+
+#[tokio::test]
+async fn shares_of_a_product_give_the_same_weights_in_bands_of_any_size() {
+    let store = Store::memory();
+    let share = |cell: usize| (cell * 7919 % 101) as f32 / 100.0;
+    let values: Vec<f32> = (0..PACIFIC.cell_count()).map(share).collect();
+    let january = contract::time::Period::month(2001, 1).unwrap();
+    let product = "mask".parse().unwrap();
+    let written = fields::write(&store, &product, &PACIFIC, &values, january);
+    let field = written.await.unwrap();
+    let region = polygon(&[[170.0, -20.0], [190.0, -22.0], [181.0, 15.0]], vec![]);
+    for of in ["land", "sea"] {
+        let shares = serde_json::json!({ "frame": field, "of": of });
+        let surface = Surface::Shares(serde_json::from_value(shares).unwrap());
+        let whole = shared_of(&PACIFIC, &region, Earth::Wgs84, &surface, Some(&values)).unwrap();
+        assert!(whole.len() > 4, "{}", whole.len());
+        for band_cells in [1, 1 << 30] {
+            let workshop = Workshop {
+                band_cells,
+                ..Workshop::of(&store)
+            };
+            let found = weighed(workshop, &PACIFIC, &region, Earth::Wgs84, &surface).await;
+            assert_eq!(found.unwrap(), whole, "{of} {band_cells}");
+        }
+    }
+}
