@@ -11,15 +11,17 @@ use futures::future::BoxFuture;
 use futures::stream::{self, StreamExt as _, TryStreamExt as _};
 use serde_json::{Value, json};
 use storage::Store;
+use storage::fields::FieldDigest;
 use zarrs::array::ArrayBytes;
 use zarrs::storage::{
     AsyncWritableStorageTraits, OffsetBytesIterator, StorageError, StoreKey, StorePrefix,
 };
 
 use crate::arrays::{self, Fixed};
+use crate::bands::WholeField;
 use crate::field::{EncodedObject, Encoder, Number};
 use crate::group::{group, write_group};
-use crate::{CubeError, Description, Step, axis};
+use crate::{Bands, CubeError, Description, Step, axis};
 
 /// Objects of a field that are encoded and sent at a time.
 pub(crate) const OBJECTS_AT_ONCE: usize = 4;
@@ -124,6 +126,23 @@ impl PlainZarr {
         values: Arc<[f32]>,
     ) -> BoxFuture<'_, Result<Step, CubeError>> {
         Box::pin(async move {
+            let grid = self.description.grid;
+            check_length(&values, grid.cell_count())?;
+            let mut whole = WholeField::new(values, grid.cols);
+            self.append_bands(period, &mut whole).await
+        })
+    }
+
+    /// The same of a field that is asked for band by band. The digest of its values is in the step: who knows it compares it.
+    ///
+    /// # Errors
+    /// `Overlap` if it does not come after the last one.
+    pub fn append_bands<'a>(
+        &'a mut self,
+        period: Period,
+        bands: &'a mut dyn Bands,
+    ) -> BoxFuture<'a, Result<Step, CubeError>> {
+        Box::pin(async move {
             if let Some(last) = self.steps.last()
                 && period.start < last.period.end
             {
@@ -133,12 +152,14 @@ impl PlainZarr {
                 });
             }
             let grid = self.description.grid;
-            check_length(&values, grid.cell_count())?;
             let at = self.steps.len() as u64;
             let values_array = arrays::values(&self.description, at + 1)?;
+            let mut digest = FieldDigest::new(&grid, period);
             for (row, rows) in self.encoder.bands().enumerate() {
-                let cells = |row: u32| row as usize * grid.cols as usize;
-                let band: Arc<[f32]> = values[cells(rows.start)..cells(rows.end)].into();
+                let count = rows.len() * grid.cols as usize;
+                let band: Arc<[f32]> = bands.rows(rows).await?.into();
+                check_length(&band, count)?;
+                digest.add(&band);
                 let sent: Vec<()> = encoded(&self.encoder, row as u32, band)
                     .map(|object| {
                         let (folder, array) = (&self.folder, &values_array);
@@ -160,7 +181,7 @@ impl PlainZarr {
             }
             let step = Step {
                 period,
-                values_sha256: storage::fields::digest_of(&grid, &values, period),
+                values_sha256: digest.finish(),
             };
             self.steps.push(step);
             Ok(step)

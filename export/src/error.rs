@@ -40,14 +40,4 @@ impl ExportError {
             detail: error.to_string(),
         }
     }
-
-    /// Refuses a step that does not fill its grid.
-    pub(crate) fn check(found: usize, grid: &contract::grid::Grid) -> Result<(), Self> {
-        let cells = grid.cell_count();
-        if found == cells {
-            Ok(())
-        } else {
-            Err(Self::Shape { found, cells })
-        }
-    }
 }

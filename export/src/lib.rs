@@ -4,6 +4,7 @@
 //! Zarr and Icechunk are the crate `cube`'s. Left out on purpose: where steps come from.
 
 pub mod answer;
+mod cells;
 mod error;
 mod geotiff;
 mod netcdf;
@@ -20,13 +21,16 @@ pub use geotiff::GeoTiffs;
 pub use netcdf::NetCdf;
 pub use parquet::Table;
 
+/// Values of a step, `[row, col]`, row 0 north, NaN for no data: some rows after the other, in parts of any size.
+pub type Values<'a> = &'a mut dyn Iterator<Item = Vec<f32>>;
+
 /// What becomes of the steps of a product, given in the order of time.
 pub trait Written: Send {
-    /// Writes one step: `[row, col]`, row 0 north, NaN for no data.
+    /// Writes one step, of which no more is held than some rows.
     ///
     /// # Errors
-    /// The file cannot be written.
-    fn append(&mut self, period: Period, values: &[f32]) -> Result<(), ExportError>;
+    /// The file cannot be written; `Shape` if the step does not fill its grid.
+    fn append(&mut self, period: Period, values: Values<'_>) -> Result<(), ExportError>;
 
     /// Makes it whole, under its name.
     ///

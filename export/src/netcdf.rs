@@ -12,7 +12,8 @@ use netcdf4::{attach, scale, texts};
 use serde_json::{Map, Value};
 use tempfile::TempPath;
 
-use crate::{ExportError, Written, part_of};
+use crate::cells::Cells;
+use crate::{ExportError, Values, Written, part_of};
 
 /// Cells of a chunk along each side, as a cube's.
 const CHUNK_CELLS: usize = 512;
@@ -55,29 +56,35 @@ impl NetCdf {
 }
 
 impl Written for NetCdf {
-    fn append(&mut self, period: Period, values: &[f32]) -> Result<(), ExportError> {
-        ExportError::check(values.len(), &self.grid)?;
+    fn append(&mut self, period: Period, values: Values<'_>) -> Result<(), ExportError> {
         if self.periods.get(self.next) != Some(&period) {
             return Err(ExportError::Step {
                 found: period.to_string(),
             });
         }
-        let shape = (self.grid.rows as usize, self.grid.cols as usize);
-        let all = |count| SliceOrIndex::SliceCount {
-            start: 0,
+        let cols = self.grid.cols as usize;
+        let some = |start, count| SliceOrIndex::SliceCount {
+            start,
             step: 1,
             count,
             block: 1,
         };
-        let step = Hyperslab::from(vec![
-            SliceOrIndex::Index(self.next),
-            all(shape.0),
-            all(shape.1),
-        ]);
-        let map = ArrayView2::from_shape(shape, values);
-        let map = map.map_err(ExportError::library(&self.path))?;
-        let written = self.values.write_slice(map, step);
-        written.map_err(ExportError::library(&self.path))?;
+        // Whole rows of chunks, so that each is packed once.
+        let mut cells = Cells::new(values, &self.grid);
+        let mut first = 0;
+        while let Some(values) = cells.next(CHUNK_CELLS * cols)? {
+            let rows = values.len() / cols;
+            let part = Hyperslab::from(vec![
+                SliceOrIndex::Index(self.next),
+                some(first, rows),
+                some(0, cols),
+            ]);
+            let map = ArrayView2::from_shape((rows, cols), values);
+            let map = map.map_err(ExportError::library(&self.path))?;
+            let written = self.values.write_slice(map, part);
+            written.map_err(ExportError::library(&self.path))?;
+            first += rows;
+        }
         self.next += 1;
         Ok(())
     }

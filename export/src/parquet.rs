@@ -15,7 +15,8 @@ use parquet::file::metadata::KeyValue;
 use parquet::file::properties::WriterProperties;
 use tempfile::NamedTempFile;
 
-use crate::{ExportError, Written, part_of};
+use crate::cells::Cells;
+use crate::{ExportError, Values, Written, part_of};
 
 /// Cells whose rows are made at a time: some 40 MB.
 const CELLS_AT_ONCE: usize = 1 << 20;
@@ -85,10 +86,12 @@ impl Table {
 }
 
 impl Written for Table {
-    fn append(&mut self, period: Period, values: &[f32]) -> Result<(), ExportError> {
-        ExportError::check(values.len(), &self.description.grid)?;
-        for (part, values) in values.chunks(CELLS_AT_ONCE).enumerate() {
-            let rows = self.rows(period, values, part * CELLS_AT_ONCE)?;
+    fn append(&mut self, period: Period, values: Values<'_>) -> Result<(), ExportError> {
+        let mut cells = Cells::new(values, &self.description.grid);
+        let mut first = 0;
+        while let Some(values) = cells.next(CELLS_AT_ONCE)? {
+            let rows = self.rows(period, values, first)?;
+            first += values.len();
             let written = self.writer.write(&rows);
             written.map_err(ExportError::library(&self.path))?;
         }

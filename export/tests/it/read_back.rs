@@ -50,9 +50,21 @@ fn values(step: usize) -> Vec<f32> {
 }
 
 fn written(format: Format, path: &Path, quantity: Quantity) -> Result<(), ExportError> {
+    written_in(GRID.rows as usize, format, path, quantity)
+}
+
+/// The same in bands of so many rows.
+fn written_in(
+    rows: usize,
+    format: Format,
+    path: &Path,
+    quantity: Quantity,
+) -> Result<(), ExportError> {
     let mut written = create(format, path, &description(quantity), &periods())?;
     for (step, period) in periods().into_iter().enumerate() {
-        written.append(period, &values(step))?;
+        let values = values(step);
+        let bands = values.chunks(rows * GRID.cols as usize);
+        written.append(period, &mut bands.map(<[f32]>::to_vec))?;
     }
     written.finish()
 }
@@ -164,8 +176,9 @@ fn half_an_export_leaves_nothing_and_a_wrong_step_is_refused() {
         let path = folder.path().join("out");
         let quantity = Quantity::CarbonFlux;
         let mut half = create(format, &path, &description(quantity), &periods()).unwrap();
-        half.append(periods()[0], &values(0)).unwrap();
-        let short = half.append(periods()[1], &values(1)[1..]);
+        half.append(periods()[0], &mut [values(0)].into_iter())
+            .unwrap();
+        let short = half.append(periods()[1], &mut [values(1)[1..].to_vec()].into_iter());
         assert!(matches!(short, Err(ExportError::Shape { .. })));
         drop(half);
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
@@ -176,11 +189,14 @@ fn half_an_export_leaves_nothing_and_a_wrong_step_is_refused() {
 fn the_same_values_are_the_same_bytes() {
     for format in [Format::NetCdf, Format::Parquet] {
         let folder = tempfile::tempdir().unwrap();
-        let bytes = |name: &str| {
-            let path = folder.path().join(name);
-            written(format, &path, Quantity::CarbonFlux).unwrap();
+        let bytes = |rows: usize| {
+            let path = folder.path().join(rows.to_string());
+            let _was = std::fs::remove_file(&path);
+            written_in(rows, format, &path, Quantity::CarbonFlux).unwrap();
             std::fs::read(path).unwrap()
         };
-        assert!(bytes("a") == bytes("b"), "{format:?}");
+        for rows in [1, 7] {
+            assert!(bytes(30) == bytes(rows), "{format:?} in bands of {rows}");
+        }
     }
 }

@@ -1,23 +1,21 @@
 //! `fluxglobe export`: a version of a product in, a cube or files out that others' programs open.
 
 use std::path::Path;
-use std::sync::Arc;
 
 use anyhow::{Context as _, Result, bail};
+use contract::chunk::BAND_CELLS;
+use contract::kind::Vouched;
 use contract::manifest::{Manifest, Step};
 use contract::time::Period;
-use cube::{At, Cube, Description, Follower, PlainZarr, Repository};
+use cube::{At, Cube, Description, FieldBands, Follower, PlainZarr, Repository};
 use export::Format;
-use futures::stream::{self, StreamExt as _, TryStreamExt as _};
 use indicatif::ProgressBar;
 use serde::Serialize;
-use storage::Store;
+use storage::{Store, fields};
+use tokio::sync::mpsc;
 
 use crate::cli::{Export, ExportFormat, ExportedProduct, Settings};
 use crate::{deployment, progress};
-
-/// Fields that are read while one is written.
-const FIELDS_AHEAD: usize = 2;
 
 /// What was written.
 #[derive(Serialize)]
@@ -39,11 +37,12 @@ pub(crate) async fn run(settings: &Settings, options: &Export) -> Result<()> {
     let bar = progress::bar("export", manifest.steps.len() as u64);
     let (url, tag) = if let Some(format) = file_format(options.to) {
         let path = local(&options.destination)?;
-        files(&store, &manifest, (format, path), &bar).await?;
+        files(Source::new(&store, &manifest, &bar), format, path).await?;
         (options.destination.clone(), None)
     } else {
         let destination = destination(&options.destination)?;
-        let tag = arrays(&store, &manifest, options.to, (&destination, &bar)).await?;
+        let source = Source::new(&store, &manifest, &bar);
+        let tag = arrays(source, options.to, &destination).await?;
         (destination.url().to_owned(), tag)
     };
     let exported = Exported {
@@ -81,44 +80,122 @@ fn local(text: &str) -> Result<&Path> {
     Ok(Path::new(text))
 }
 
-/// Writes files, each step on a thread for what blocks.
-async fn files(
-    store: &Store,
-    manifest: &Manifest,
-    (format, path): (Format, &Path),
-    bar: &ProgressBar,
-) -> Result<()> {
+/// What is exported, and who is told how far it is.
+#[derive(Clone, Copy)]
+struct Source<'a> {
+    store: &'a Store,
+    manifest: &'a Manifest,
+    bar: &'a ProgressBar,
+    /// Maps of more cells are read in bands of at most so many.
+    band_cells: u64,
+}
+
+impl<'a> Source<'a> {
+    fn new(store: &'a Store, manifest: &'a Manifest, bar: &'a ProgressBar) -> Self {
+        Self {
+            store,
+            manifest,
+            bar,
+            band_cells: BAND_CELLS,
+        }
+    }
+
+    /// Is a map more than one band, and so never held whole?
+    fn is_large(&self) -> bool {
+        self.manifest.grid.cell_count() as u64 > self.band_cells
+    }
+}
+
+/// What a writer is given of a step.
+enum Arriving {
+    /// Values of the next rows.
+    Band(Vec<f32>),
+    /// They were all, and are what they should be.
+    End,
+}
+
+/// Writes files on a thread for what blocks, while what comes next is read.
+async fn files(source: Source<'_>, format: Format, path: &Path) -> Result<()> {
+    let manifest = source.manifest;
     let description = Description::of(manifest);
     let periods: Vec<Period> = manifest.steps.iter().map(|step| step.period).collect();
     let mut written = export::create(format, path, &description, &periods)?;
+    let (sender, mut arriving) = mpsc::channel(1);
+    let writing = tokio::task::spawn_blocking(move || {
+        for period in periods {
+            let mut is_whole = false;
+            let mut bands = std::iter::from_fn(|| match arriving.blocking_recv() {
+                Some(Arriving::Band(values)) => Some(values),
+                Some(Arriving::End) => {
+                    is_whole = true;
+                    None
+                }
+                None => None,
+            });
+            let appended = written.append(period, &mut bands);
+            if !is_whole && appended.is_ok() {
+                // Whoever reads says why; what was written goes.
+                return Ok(());
+            }
+            appended?;
+        }
+        written.finish()
+    });
+    let sent = send(source, sender).await;
+    let wrote = writing.await?;
+    // Where reading failed, that is why there was too little to write.
+    sent?;
+    Ok(wrote?)
+}
+
+/// Sends the values of all steps in the order of time, as long as somebody takes them.
+async fn send(source: Source<'_>, sender: mpsc::Sender<Arriving>) -> Result<()> {
+    let (store, manifest) = (source.store, source.manifest);
     let cube = own_cube(store, manifest).await;
-    let mut fields = std::pin::pin!(fields(store, cube.as_ref(), manifest, bar));
-    while let Some((period, values)) = fields.try_next().await? {
-        let append = tokio::task::spawn_blocking(move || {
-            written.append(period, &values)?;
-            Ok::<_, export::ExportError>(written)
-        });
-        written = append.await??;
-        bar.inc(1);
+    for (place, step) in manifest.steps.iter().enumerate() {
+        source.bar.set_message(progress::day(step.period.start));
+        if let Some(cube) = cube.as_ref().filter(|_| !source.is_large()) {
+            let values = Arriving::Band(cube.field(place).await?);
+            if sender.send(values).await.is_err() {
+                return Ok(());
+            }
+        } else {
+            let band_cells = source.band_cells;
+            let mut bands = fields::bands(store, &step.field, &manifest.grid, band_cells).await?;
+            while let Some((_rows, values)) = bands.next().await? {
+                if sender.send(Arriving::Band(values)).await.is_err() {
+                    return Ok(());
+                }
+            }
+        }
+        if sender.send(Arriving::End).await.is_err() {
+            return Ok(());
+        }
+        source.bar.inc(1);
     }
-    tokio::task::spawn_blocking(move || written.finish()).await??;
     Ok(())
 }
 
 /// Writes a cube; of a repository the name of the version in it.
 async fn arrays(
-    store: &Store,
-    manifest: &Manifest,
+    source: Source<'_>,
     to: ExportFormat,
-    (destination, bar): (&Store, &ProgressBar),
+    destination: &Store,
 ) -> Result<Option<String>> {
+    let (store, manifest, bar) = (source.store, source.manifest, source.bar);
     if to == ExportFormat::Zarr {
         let description = Description::of(manifest);
         let mut zarr = PlainZarr::create(destination, "", &description).await?;
         let cube = own_cube(store, manifest).await;
-        let mut fields = std::pin::pin!(fields(store, cube.as_ref(), manifest, bar));
-        while let Some((period, values)) = fields.try_next().await? {
-            zarr.append(period, values).await?;
+        for (place, step) in manifest.steps.iter().enumerate() {
+            bar.set_message(progress::day(step.period.start));
+            match cube.as_ref().filter(|_| !source.is_large()) {
+                Some(cube) => {
+                    let values = cube.field(place).await?;
+                    zarr.append(step.period, values.into()).await?;
+                }
+                None => append_field(source, step, &mut zarr).await?,
+            }
             bar.inc(1);
         }
         zarr.finish().await?;
@@ -136,6 +213,22 @@ async fn arrays(
     };
     follower.run(manifest).await?;
     Ok(Some(manifest.number.to_string()))
+}
+
+/// Writes a step from its field, of which rows are read as they are needed.
+async fn append_field(source: Source<'_>, step: &Step, zarr: &mut PlainZarr) -> Result<()> {
+    let mut bands = FieldBands::new(source.store, &step.field, &source.manifest.grid);
+    let digest = zarr.append_bands(step.period, &mut bands).await?;
+    let digest = digest.values_sha256;
+    if let Vouched::Values(name) = step.field.vouches()
+        && name != digest
+    {
+        bail!(
+            "{} is damaged: its values have the digest {digest}",
+            step.field
+        );
+    }
+    Ok(())
 }
 
 fn summary(exported: &Exported) -> String {
@@ -209,26 +302,6 @@ async fn own_cube(store: &Store, manifest: &Manifest) -> Option<Cube> {
     }
 }
 
-/// Values of the steps in the order of time, a few read ahead: from the cube of the version, or from its fields.
-fn fields<'a>(
-    store: &'a Store,
-    cube: Option<&'a Cube>,
-    manifest: &'a Manifest,
-    bar: &'a ProgressBar,
-) -> impl stream::Stream<Item = Result<(Period, Arc<[f32]>)>> + 'a {
-    let read = move |place: usize, step: &'a Step| async move {
-        bar.set_message(progress::day(step.period.start));
-        let values = match cube {
-            Some(cube) => cube.field(place).await?,
-            None => storage::fields::read(store, &step.field, &manifest.grid).await?,
-        };
-        Ok((step.period, Arc::from(values)))
-    };
-    stream::iter(manifest.steps.iter().enumerate())
-        .map(move |(place, step)| read(place, step))
-        .buffered(FIELDS_AHEAD)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -246,5 +319,133 @@ mod tests {
         let file = path.join("a");
         let refused = destination(file.to_str().unwrap()).unwrap_err().to_string();
         assert!(refused.contains("is a file"), "{refused}");
+    }
+
+    /// A version of two steps in a folder, of three rows of chunks and without a cube.
+    async fn landed(folder: &Path) -> (Store, Manifest) {
+        let store = Store::open(folder.join("store").to_str().unwrap()).unwrap();
+        let grid = contract::grid::Grid {
+            rows: 150,
+            cols: 250,
+            north_deg: 75.0,
+            west_deg: -125.0,
+            dlat_deg: 1.0,
+            dlon_deg: 1.0,
+        };
+        let product: contract::product::ProductId = "p".parse().unwrap();
+        let mut steps = vec![];
+        for month in [1, 2] {
+            let value = |cell: usize| match cell % 17 {
+                0 => f32::NAN,
+                _ => (cell % 1009 * month as usize) as f32 * 1e-10,
+            };
+            let values: Vec<f32> = (0..grid.cell_count()).map(value).collect();
+            let period = Period::month(2001, month).unwrap();
+            let field = fields::write(&store, &product, &grid, &values, period);
+            steps.push(Step {
+                masked: None,
+                period,
+                field: field.await.unwrap(),
+                raw_sha256: contract::digest::Digest::of(&[month as u8]),
+                origin: "made by a test".to_owned(),
+                valid_cells: 0,
+                contributed: None,
+            });
+        }
+        let cells = vec![true; grid.cell_count()];
+        let manifest = Manifest {
+            schema: contract::manifest::MANIFEST_SCHEMA,
+            number: 1,
+            title: "Fluxes".to_owned(),
+            quantity: contract::quantity::Quantity::CarbonFlux,
+            synthetic: true,
+            source: "made by a test".to_owned(),
+            grid,
+            steps,
+            domain: storage::domain::write(&store, &product, &cells)
+                .await
+                .unwrap(),
+            product,
+            series: vec![],
+            derived_from: None,
+            computed: None,
+            notices: vec![],
+        };
+        (store, manifest)
+    }
+
+    /// Relative paths and bytes of all files below a folder.
+    fn all(folder: &Path) -> Vec<(String, Vec<u8>)> {
+        let mut found = vec![];
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            let name = path.file_name().unwrap().to_string_lossy().into_owned();
+            if path.is_dir() {
+                let below = all(&path).into_iter();
+                found.extend(below.map(|(own, bytes)| (format!("{name}/{own}"), bytes)));
+            } else {
+                found.push((name, std::fs::read(&path).unwrap()));
+            }
+        }
+        found.sort();
+        found
+    }
+
+    #[tokio::test]
+    async fn maps_in_bands_are_exported_as_whole_ones_are() {
+        let folder = tempfile::tempdir().unwrap();
+        let (store, manifest) = landed(folder.path()).await;
+        let bar = ProgressBar::hidden();
+        let whole = Source::new(&store, &manifest, &bar);
+        let banded = Source {
+            band_cells: 1,
+            ..whole
+        };
+        assert!(banded.is_large() && !whole.is_large());
+        for format in [Format::NetCdf, Format::GeoTiff, Format::Parquet] {
+            for (name, source) in [("whole", whole), ("banded", banded)] {
+                let path = folder.path().join(name).join(format!("{format:?}"));
+                std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+                files(source, format, &path).await.unwrap();
+            }
+        }
+        for (name, source) in [("whole", whole), ("banded", banded)] {
+            let path = folder.path().join(name).join("zarr");
+            let destination = destination(path.to_str().unwrap()).unwrap();
+            arrays(source, ExportFormat::Zarr, &destination)
+                .await
+                .unwrap();
+        }
+        let expected = all(&folder.path().join("whole"));
+        assert!(expected.len() > 10, "{}", expected.len());
+        assert!(all(&folder.path().join("banded")) == expected);
+    }
+
+    #[tokio::test]
+    async fn a_field_of_other_values_than_its_name_leaves_nothing_behind() {
+        let folder = tempfile::tempdir().unwrap();
+        let (store, manifest) = landed(folder.path()).await;
+        // Of the last step, whose every row is sound: only all of them together tell.
+        let last = manifest.steps.last().unwrap();
+        let values = vec![1e-9; manifest.grid.cell_count()];
+        let other = fields::encode(&manifest.grid, &values, last.period).unwrap();
+        store.put_over(&last.field, other.content).await.unwrap();
+        let bar = ProgressBar::hidden();
+        let source = Source {
+            band_cells: 1,
+            ..Source::new(&store, &manifest, &bar)
+        };
+        let out = folder.path().join("out");
+        std::fs::create_dir(&out).unwrap();
+        for format in [Format::NetCdf, Format::GeoTiff, Format::Parquet] {
+            let failed = files(source, format, &out.join("a")).await.unwrap_err();
+            let text = format!("{failed:#}");
+            assert!(text.contains(last.field.as_str()), "{text}");
+            assert_eq!(all(&out), [], "{format:?}");
+        }
+        let zarr = destination(folder.path().join("zarr").to_str().unwrap()).unwrap();
+        let failed = arrays(source, ExportFormat::Zarr, &zarr).await.unwrap_err();
+        assert!(format!("{failed:#}").contains(last.field.as_str()));
+        assert!(!folder.path().join("zarr/zarr.json").exists());
     }
 }
