@@ -47,7 +47,9 @@ impl Weighed {
         query: &StatisticsQuery,
     ) -> Result<Self, ComputeError> {
         match &query.geometry {
-            Geometry::Region(region) => Self::region(engine, manifest, query, region).await,
+            Geometry::Region(region) => {
+                Box::pin(Self::region(engine, manifest, query, region)).await
+            }
             Geometry::Line(line) => {
                 let size = length_m(line, query.earth);
                 Self::plain(engine, manifest, query, size).await
