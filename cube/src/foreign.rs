@@ -9,6 +9,7 @@ mod adapter;
 mod array;
 mod chunks;
 mod error;
+mod failures;
 mod hierarchy;
 mod objects;
 mod read_only;

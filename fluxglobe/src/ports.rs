@@ -267,7 +267,7 @@ fn fleet_failed(error: &FleetError) -> BackendError {
 
 /// What of a failure is to be told that came from a store of others, where that lasts: it is neither the asker's fault nor ours.
 fn upstream(error: &(dyn Error + 'static)) -> Option<BackendError> {
-    let failure = Failure::behind(error).filter(|failure| !failure.is_retryable)?;
+    let failure = Failure::behind(error).filter(|failure| !failure.is_retryable())?;
     Some(BackendError::new(Class::Upstream, failure.to_string()))
 }
 
@@ -323,6 +323,7 @@ mod tests {
     use contract::quantity::Quantity;
     use contract::region::Cells;
     use contract::time::Period;
+    use storage::attached::Cause;
     use storage::{Store, domain, fields, manifests};
 
     use super::*;
@@ -384,7 +385,11 @@ mod tests {
         let failure = |is_retryable| Failure {
             place: "array \"fco2\" of https://data.example/fco2.zarr".to_owned(),
             reason: "its values are others than were attached".to_owned(),
-            is_retryable,
+            cause: if is_retryable {
+                Cause::Away
+            } else {
+                Cause::Content
+            },
         };
         let stored = |source: Box<dyn Error + Send + Sync>| storage::StorageError::Object {
             key: "fields/fco2".to_owned(),

@@ -25,7 +25,7 @@ use layer::{Held, Layer};
 use reference::MAX_REFERENCE_BYTES;
 
 pub use crate::attached_mark::is_attached;
-pub use crate::failure::Failure;
+pub use crate::failure::{Cause, Failure};
 pub use attachment::{Attachment, StoreKind};
 pub use reference::Reference;
 pub use source::Source;

@@ -116,7 +116,7 @@ fn is_final(cause: &(dyn std::error::Error + 'static)) -> bool {
     // Requests that were too slow, too many, or in each other's way.
     const PASSING: [&str; 3] = ["408", "409", "429"];
     if let Some(failure) = cause.downcast_ref::<Failure>() {
-        return !failure.is_retryable;
+        return !failure.is_retryable();
     }
     let text = cause.to_string();
     if let Some((_, status)) = text.split_once("status code: ")

@@ -4,6 +4,7 @@
 //! how an object is created once (`create`), who tries again after a failure that may pass (the clouds' clients
 //! themselves, `retry_store` for HDFS), and nothing else.
 
+mod answers;
 mod check;
 mod checked;
 mod clouds;
@@ -102,6 +103,12 @@ impl Store {
     /// `Location`, with what to give or set.
     pub fn open(location: &str) -> Result<Self, StorageError> {
         Self::open_with(location, &Settings::from_environment())
+    }
+
+    /// Opens a store of others, to be read: as [`Store::open`] does, and where the environment holds no credentials of its kind,
+    /// as anybody may.
+    pub fn open_of_others(location: &str) -> Result<Self, StorageError> {
+        Self::open_with(location, &Settings::from_environment().as_anybody())
     }
 
     /// Opens a store with settings other than this process' environment.

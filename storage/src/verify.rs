@@ -8,6 +8,7 @@ use contract::product::ProductId;
 use futures::{StreamExt as _, TryStreamExt as _, stream};
 use serde::Serialize;
 
+use crate::failure::Cause;
 use crate::sound::Soundness;
 use crate::sound::large;
 use crate::{StorageError, Store, manifests};
@@ -174,8 +175,8 @@ async fn check(store: &Store, key: &ObjectKey) -> Result<Checked, StorageError> 
     match large::of_stored(store, key).await {
         Ok((soundness, bytes)) => Ok(Checked::Sound(soundness, bytes)),
         Err(e) if e.is_not_found() => Ok(Checked::Gone),
-        // Of an attached product, and not what was attached any more.
-        Err(e) if !e.is_retryable() && e.attached().is_some() => {
+        // Of an attached product, and not what was attached any more. Who is not let in knows nothing of that.
+        Err(e) if e.attached().is_some_and(|of| of.cause == Cause::Content) => {
             Ok(Checked::Damaged(e.to_string()))
         }
         Err(StorageError::Damaged { reason, .. }) => Ok(Checked::Damaged(reason)),

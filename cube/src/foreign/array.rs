@@ -9,6 +9,7 @@ use zarrs::plugin::ExtensionName as _;
 use zarrs::storage::AsyncReadableStorageTraits;
 
 use super::error::ForeignError;
+use super::failures::Failures;
 
 /// Most dimensions of an array.
 const MAX_RANK: usize = 32;
@@ -53,6 +54,8 @@ pub struct ForeignArray {
     pub is_zarr2: bool,
     /// For messages.
     pub(super) place: String,
+    /// What its store failed at.
+    pub(super) failures: Arc<Failures>,
     pub(super) inner: Array<dyn AsyncReadableStorageTraits>,
     /// Indexes of shards.
     pub(super) shards: AsyncArrayShardedReadableExtCache,
@@ -62,7 +65,7 @@ impl ForeignArray {
     /// What an opened array says.
     pub(super) fn new(
         name: &str,
-        place: &str,
+        (place, failures): (&str, &Arc<Failures>),
         inner: Array<dyn AsyncReadableStorageTraits>,
     ) -> Result<Self, ForeignError> {
         let place = format!("{place} array {name}");
@@ -95,6 +98,7 @@ impl ForeignArray {
             is_zarr2,
             shards: AsyncArrayShardedReadableExtCache::new(&inner),
             place,
+            failures: Arc::clone(failures),
             inner,
         })
     }

@@ -14,7 +14,6 @@ use zarrs::storage::byte_range::ByteRange;
 
 use super::array::{Absent, ArrayKind, ForeignArray, Unpacked, number};
 use super::error::ForeignError;
-use crate::error::first_lines;
 
 /// Chunks that are kept unpacked, bytes: a year of days in one chunk along time is read a step at a time.
 const KEPT_BYTES: u64 = 256 << 20;
@@ -98,7 +97,7 @@ async fn unpacked(
     let bytes = array.chunk_bytes(cells)?;
     let place = || format!("{} chunk {index:?}", array.place);
     let packed = array.inner.async_retrieve_encoded_chunk(index).await;
-    let packed = packed.map_err(|e| ForeignError::away(place(), first_lines(&e)))?;
+    let packed = packed.map_err(|e| array.failures.told(&place(), "reading it", &e))?;
     let Some(packed) = packed else {
         return Ok(None);
     };
@@ -178,9 +177,9 @@ async fn check_there(
         .collect();
     for index in indexes(&ranges) {
         let range = array.inner.async_subchunk_byte_range(&array.shards, &index);
-        let range = range
-            .await
-            .map_err(|e| ForeignError::refused(&array.place, first_lines(&e)))?;
+        let place = format!("{} chunk {index:?}", array.place);
+        let failed = |e| array.failures.told(&place, "looking for it", &e);
+        let range = range.await.map_err(failed)?;
         // The library gives what the index has, where one that is not there has no place but all bits set.
         let is_there = range.is_some_and(|it| !matches!(it, ByteRange::FromStart(u64::MAX, _)));
         if !is_there {

@@ -1,5 +1,7 @@
 //! Why something of a store of others cannot be read.
 
+use storage::attached::Cause;
+
 /// What is not read, and why; nothing in it is secret.
 #[derive(Debug, Clone, thiserror::Error)]
 #[error("{place}: {reason}")]
@@ -8,26 +10,47 @@ pub struct ForeignError {
     pub place: String,
     /// What is wrong and, where something can be done, what.
     pub reason: String,
-    /// May the same succeed later?
-    pub is_retryable: bool,
+    /// Where that lies.
+    pub cause: Cause,
 }
 
 impl ForeignError {
-    /// What stays as it is.
+    /// What is there and cannot be read rightly.
     pub fn refused(place: impl Into<String>, reason: impl Into<String>) -> Self {
         Self {
             place: place.into(),
             reason: reason.into(),
-            is_retryable: false,
+            cause: Cause::Content,
+        }
+    }
+
+    /// What is not given to whoever asks as we do.
+    pub fn denied(place: impl Into<String>, reason: impl Into<String>) -> Self {
+        Self {
+            cause: Cause::Access,
+            ..Self::refused(place, reason)
         }
     }
 
     /// What may pass.
     pub fn away(place: impl Into<String>, reason: impl Into<String>) -> Self {
         Self {
+            cause: Cause::Away,
+            ..Self::refused(place, reason)
+        }
+    }
+
+    /// May the same succeed later?
+    pub fn is_retryable(&self) -> bool {
+        self.cause.is_retryable()
+    }
+
+    /// The same of what was to be read of it: an array, say, or a chunk.
+    pub(super) fn of(self, place: impl Into<String>) -> Self {
+        Self {
+            reason: self.to_string(),
             place: place.into(),
-            reason: reason.into(),
-            is_retryable: true,
+            cause: self.cause,
         }
     }
 }

@@ -9,7 +9,7 @@ use icechunk::RepositoryConfig;
 use icechunk::format::SnapshotId;
 use icechunk::repository::VersionInfo;
 use serde_json::{Map, Value};
-use storage::attached::StoreKind;
+use storage::attached::{Cause, StoreKind};
 use zarrs::array::Array;
 use zarrs::config::MetadataRetrieveVersion;
 use zarrs::storage::{
@@ -21,6 +21,7 @@ use super::adapter::{Adapter, MAX_DOCUMENT_BYTES};
 use super::array::{Absent, ForeignArray};
 use super::chunks::Chunks;
 use super::error::ForeignError;
+use super::failures::{Failures, Noted};
 use super::objects::Objects;
 use super::read_only::ReadOnly;
 use crate::error::first_lines;
@@ -49,6 +50,7 @@ pub struct Foreign {
     arrays: BTreeMap<String, Result<ForeignArray, ForeignError>>,
     chunks: Chunks,
     place: String,
+    failures: Arc<Failures>,
     /// Of a repository: tells what changed between its states.
     repository: Option<icechunk::Repository>,
 }
@@ -79,6 +81,15 @@ impl Found {
                 snapshot: None,
             })
         };
+        // Where nothing may be listed, what is not there is refused as what must not be read is.
+        let mut denied = None;
+        let mut is_there = async |name: &str| match objects.size(name).await {
+            Err(e) if e.cause == Cause::Access => {
+                denied.get_or_insert(e);
+                Ok(false)
+            }
+            size => size.map(|size| size.is_some()),
+        };
         for (name, kind) in [
             ("zarr.json", StoreKind::Zarr3),
             (".zmetadata", StoreKind::Zarr2),
@@ -86,11 +97,15 @@ impl Found {
             ("repo", StoreKind::Icechunk),
             ("refs/branch.main/ref.json", StoreKind::Icechunk),
         ] {
-            if objects.size(name).await?.is_some() {
+            if is_there(name).await? {
                 return of(kind);
             }
         }
-        let reason = if objects.size(".zarray").await?.is_some() {
+        let is_array = is_there(".zarray").await?;
+        if let Some(denied) = denied.filter(|_| !is_array) {
+            return Err(denied);
+        }
+        let reason = if is_array {
             "is a single array: give the group that it lies in, with its coordinates"
         } else {
             "is neither a Zarr group (zarr.json, .zgroup) nor an Icechunk repository (repo)"
@@ -111,15 +126,18 @@ impl Foreign {
         wanted: Option<&str>,
     ) -> Result<Self, ForeignError> {
         let place = objects.place();
+        let (objects, failures) = Noted::of(objects);
         match found.kind {
             StoreKind::Icechunk => {
-                let (repository, store, found) = repository(objects, found).await?;
+                let opened = repository(objects, (found, &failures)).await?;
+                let (repository, store, found) = opened;
                 let names = store.list_dir(&StorePrefix::root()).await;
-                let names = names.map_err(|e| ForeignError::refused(&place, first_lines(&e)))?;
+                let names = names.map_err(|e| failures.told(&place, "listing its arrays", &e))?;
                 let names = names.prefixes().iter();
                 let names = names.map(|name| name.as_str().trim_end_matches('/').to_owned());
                 let wanted = Wanted::All(names.collect());
-                let mut own = Self::of((Arc::new(store), found), place, wanted).await?;
+                let store: Arrays = Arc::new(store);
+                let mut own = Self::of((store, found), (place, failures), wanted).await?;
                 own.repository = Some(repository);
                 Ok(own)
             }
@@ -139,21 +157,26 @@ impl Foreign {
                 };
                 let documents = Arc::new(documents);
                 let adapter = Adapter { objects, documents };
-                Self::of((Arc::new(adapter), found), place, wanted).await
+                Self::of((Arc::new(adapter), found), (place, failures), wanted).await
             }
         }
     }
 
     /// Opens one array alone.
+    ///
+    /// # Errors
+    /// It cannot be read.
     pub async fn open_one(
         objects: Arc<dyn Objects>,
         found: Found,
         array: &str,
     ) -> Result<Self, ForeignError> {
         let place = objects.place();
+        let (objects, failures) = Noted::of(objects);
         let (store, found): (Arrays, Found) = match found.kind {
             StoreKind::Icechunk => {
-                let (_repository, store, found) = repository(objects, found).await?;
+                let opened = repository(objects, (found, &failures)).await?;
+                let (_repository, store, found) = opened;
                 (Arc::new(store), found)
             }
             StoreKind::Zarr2 | StoreKind::Zarr3 => {
@@ -161,12 +184,15 @@ impl Foreign {
                 (Arc::new(Adapter { objects, documents }), found)
             }
         };
-        Self::of((store, found), place, Wanted::One(array)).await
+        let own = Self::of((store, found), (place, failures), Wanted::One(array)).await?;
+        // Who keeps it open must not keep what may pass.
+        own.array(array)?;
+        Ok(own)
     }
 
     async fn of(
         (store, found): (Arrays, Found),
-        place: String,
+        (place, failures): (String, Arc<Failures>),
         wanted: Wanted<'_>,
     ) -> Result<Self, ForeignError> {
         let mut own = Self {
@@ -174,6 +200,7 @@ impl Foreign {
             arrays: BTreeMap::new(),
             chunks: Chunks::default(),
             place,
+            failures,
             found,
             repository: None,
         };
@@ -185,13 +212,13 @@ impl Foreign {
                         format!("has {} arrays, at most {MAX_ARRAYS} are read", names.len());
                     return Err(ForeignError::refused(own.place, reason));
                 }
-                own.attributes = group(&store, own.found.kind, &own.place).await?;
+                own.attributes = group(&store, own.found.kind, (&own.place, &own.failures)).await?;
                 for name in names {
                     own.add(&store, &name).await;
                 }
             }
             Wanted::Around(name) => {
-                own.attributes = group(&store, own.found.kind, &own.place).await?;
+                own.attributes = group(&store, own.found.kind, (&own.place, &own.failures)).await?;
                 own.add(&store, name).await;
                 for _with_bounds in 0..2 {
                     for name in own.mentioned() {
@@ -214,14 +241,13 @@ impl Foreign {
         };
         let opened = Array::async_open_opt(Arc::clone(store), &format!("/{name}"), &version).await;
         let array = match opened {
-            Ok(array) => ForeignArray::new(name, &self.place, array),
+            Ok(array) => ForeignArray::new(name, (&self.place, &self.failures), array),
             Err(zarrs::array::ArrayCreateError::MissingMetadata) => return,
             Err(e) => {
-                let reason = format!("cannot be read by this program: {}", first_lines(&e));
-                Err(ForeignError::refused(
-                    format!("{} array {name}", self.place),
-                    reason,
-                ))
+                let place = format!("{} array {name}", self.place);
+                Err(self
+                    .failures
+                    .told(&place, "cannot be read by this program", &e))
             }
         };
         self.arrays.insert(name.to_owned(), array);
@@ -331,12 +357,10 @@ impl Foreign {
 /// Opens a state of a repository.
 async fn repository(
     objects: Arc<dyn Objects>,
-    found: Found,
+    (found, failures): (Found, &Failures),
 ) -> Result<(icechunk::Repository, AsyncIcechunkStore, Found), ForeignError> {
     let place = objects.place();
-    let refused = |doing: &str, e: &dyn std::fmt::Display| {
-        ForeignError::refused(&place, format!("{doing}: {}", first_lines(e)))
-    };
+    let refused = |doing: &str, e: &dyn std::fmt::Display| failures.told(&place, doing, e);
     let opened = icechunk::Repository::open(Arc::new(ReadOnly(objects)))
         .config(read_when_needed(RepositoryConfig::default()));
     let opened = opened.execute().await;
@@ -370,7 +394,12 @@ async fn documents(
         StoreKind::Zarr3 | StoreKind::Icechunk => "zarr.json",
     };
     let mut all = BTreeMap::new();
-    let Some(content) = objects.get(name, None, MAX_DOCUMENT_BYTES).await? else {
+    let content = match objects.get(name, None, MAX_DOCUMENT_BYTES).await {
+        // Where nothing may be listed, this is how what is not there is told.
+        Err(e) if kind == StoreKind::Zarr2 && e.cause == Cause::Access => None,
+        content => content?,
+    };
+    let Some(content) = content else {
         return Ok(all);
     };
     let place = format!("{}/{name}", objects.place());
@@ -412,7 +441,7 @@ fn named(documents: &BTreeMap<String, Bytes>) -> Vec<String> {
 async fn group(
     store: &Arrays,
     kind: StoreKind,
-    place: &str,
+    (place, failures): (&str, &Failures),
 ) -> Result<Map<String, Value>, ForeignError> {
     let name = match kind {
         StoreKind::Zarr2 => ".zattrs",
@@ -421,7 +450,8 @@ async fn group(
     let refused = |e: String| ForeignError::refused(format!("{place}/{name}"), e);
     let key = StoreKey::new(name).map_err(|e| refused(e.to_string()))?;
     let document = store.get(&key).await;
-    let Some(document) = document.map_err(|e| refused(first_lines(&e)))? else {
+    let failed = |e| failures.told(place, "reading what it says of itself", &e);
+    let Some(document) = document.map_err(failed)? else {
         return Ok(Map::new());
     };
     let mut root: Value = serde_json::from_slice(&document)

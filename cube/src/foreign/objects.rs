@@ -8,6 +8,8 @@ use async_trait::async_trait;
 use bytes::Bytes;
 use object_store::path::Path;
 use object_store::{Error, GetOptions, GetRange, ObjectStore, ObjectStoreExt as _};
+use storage::attached::Cause;
+use storage::refusal::Refusal;
 use storage::{StorageError, Store};
 
 use super::error::ForeignError;
@@ -45,7 +47,7 @@ pub struct StoredObjects {
 
 impl StoredObjects {
     /// Opens a folder that is there, or the part of a bucket below a prefix: `s3://BUCKET/PREFIX` and the like, with credentials
-    /// from the variables of the environment that their clouds know.
+    /// from the variables of the environment that their clouds know; where there are none, as anybody.
     ///
     /// # Errors
     /// There is no such folder, or it is no such address.
@@ -60,7 +62,8 @@ impl StoredObjects {
         if is_folder && !FilePath::new(folder).is_dir() {
             return Err(ForeignError::refused(location, "there is no such folder"));
         }
-        let store = Store::open(if is_folder { folder } else { location }).map_err(shown)?;
+        let store =
+            Store::open_of_others(if is_folder { folder } else { location }).map_err(shown)?;
         let place = store.url().trim_end_matches('/');
         let place = place.strip_prefix("file://").unwrap_or(place).to_owned();
         Ok(Self {
@@ -73,27 +76,37 @@ impl StoredObjects {
         Path::parse(name).map_err(|e| ForeignError::refused(&self.place, e.to_string()))
     }
 
-    fn failed(&self, name: &str, error: Error) -> ForeignError {
+    /// Why an object did not come; none if it is not there.
+    fn failed(&self, name: &str, error: Error) -> Option<ForeignError> {
         let place = format!("{}/{name}", self.place);
-        match error {
-            Error::PermissionDenied { .. } | Error::Unauthenticated { .. } => {
-                ForeignError::refused(
-                    place,
-                    "the store does not let it be read: the credentials of the environment are missing, wrong or have ended",
-                )
-            }
-            source => {
-                let error = StorageError::Object {
-                    key: name.to_owned(),
-                    source,
-                };
-                ForeignError {
-                    place,
-                    reason: error.to_string(),
-                    is_retryable: error.is_retryable(),
-                }
-            }
-        }
+        let place = place.trim_end_matches('/');
+        let Some(refusal) = Refusal::of(&error) else {
+            let key = name.to_owned();
+            let error = StorageError::Object { key, source: error };
+            let reason = error.to_string();
+            return Some(if error.is_retryable() {
+                ForeignError::away(place, reason)
+            } else {
+                ForeignError::refused(place, reason)
+            });
+        };
+        let reason = match refusal {
+            Refusal::Absent => return None,
+            Refusal::Credentials(said) => format!(
+                "the store does not let it be read ({said}): the credentials of the environment (docs/operations.md) are missing, \
+                 wrong or have ended; set such as may read it and start again. Without any, what is open to everybody is read"
+            ),
+            Refusal::Bucket(said) => format!(
+                "there is no such bucket ({said}): look at its name, and at the endpoint that the environment names"
+            ),
+            Refusal::Region(said) => format!(
+                "the bucket is in another region ({said}): set AWS_REGION to that of the bucket, or AWS_ENDPOINT_URL to its server"
+            ),
+            Refusal::Request(said) => format!(
+                "the store takes no such request ({said}): look at region, endpoint and token in the environment (docs/operations.md)"
+            ),
+        };
+        Some(ForeignError::denied(place, reason))
     }
 }
 
@@ -115,8 +128,7 @@ impl Objects for StoredObjects {
         };
         let found = match self.objects.get_opts(&self.path(name)?, options).await {
             Ok(found) => found,
-            Err(Error::NotFound { .. }) => return Ok(None),
-            Err(e) => return Err(self.failed(name, e)),
+            Err(e) => return self.failed(name, e).map_or(Ok(None), Err),
         };
         let size_bytes = found.range.end - found.range.start;
         if size_bytes > most_bytes {
@@ -126,22 +138,43 @@ impl Objects for StoredObjects {
                 most_bytes,
             ));
         }
-        let content = found.bytes().await;
-        content.map(Some).map_err(|e| self.failed(name, e))
+        match found.bytes().await {
+            Ok(content) => Ok(Some(content)),
+            Err(e) => self.failed(name, e).map_or(Ok(None), Err),
+        }
     }
 
     async fn size(&self, name: &str) -> Result<Option<u64>, ForeignError> {
-        match self.objects.head(&self.path(name)?).await {
-            Ok(meta) => Ok(Some(meta.size)),
-            Err(Error::NotFound { .. }) => Ok(None),
-            Err(e) => Err(self.failed(name, e)),
+        let path = self.path(name)?;
+        match self.objects.head(&path).await {
+            Ok(meta) => return Ok(Some(meta.size)),
+            Err(e) if Refusal::of(&e).is_none() => {
+                return self.failed(name, e).map_or(Ok(None), Err);
+            }
+            Err(_refused) => {}
+        }
+        // The answer to HEAD has no body: whether it is the object that is not there, or its bucket, only that of GET tells.
+        let options = GetOptions {
+            range: Some(GetRange::Bounded(0..1)),
+            ..GetOptions::default()
+        };
+        match self.objects.get_opts(&path, options).await {
+            Ok(found) => Ok(Some(found.meta.size)),
+            Err(e) => self.failed(name, e).map_or(Ok(None), Err),
         }
     }
 
     async fn folders(&self, folder: &str) -> Result<Option<Vec<String>>, ForeignError> {
         let path = self.path(folder)?;
-        let found = self.objects.list_with_delimiter(Some(&path)).await;
-        let found = found.map_err(|e| self.failed(folder, e))?;
+        let found = match self.objects.list_with_delimiter(Some(&path)).await {
+            Ok(found) => found,
+            // What may be read need not be what may be listed.
+            Err(e) => match self.failed(folder, e) {
+                None => return Ok(Some(vec![])),
+                Some(e) if e.cause == Cause::Access => return Ok(None),
+                Some(e) => return Err(e),
+            },
+        };
         let folders = found.common_prefixes.iter();
         let mut names: Vec<String> = folders
             .filter_map(|path| Some(path.filename()?.to_owned()))

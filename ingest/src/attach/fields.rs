@@ -6,7 +6,7 @@ use async_trait::async_trait;
 use contract::masked::MaskedCells;
 use cube::foreign::{Absent, Foreign, ForeignError, Found};
 use quick_cache::sync::Cache;
-use storage::attached::{Attachment, Failure, Reference, Source, StoreKind};
+use storage::attached::{Attachment, Cause, Failure, Reference, Source, StoreKind};
 
 use super::address;
 use super::reading::Reading;
@@ -72,22 +72,21 @@ impl Source for ForeignFields {
         let refused = |reason: String| Failure {
             place: place(),
             reason,
-            is_retryable: false,
+            cause: Cause::Content,
         };
         let reading = Reading::of(attachment).map_err(refused)?;
         let failed = |error: ForeignError| {
-            let advice = if error.is_retryable {
-                String::new()
-            } else {
-                format!(
+            let advice = match error.cause {
+                Cause::Content => format!(
                     "; if the store has changed since it was attached, run `fluxglobe attach --refresh {}`",
                     attachment.product
-                )
+                ),
+                Cause::Access | Cause::Away => String::new(),
             };
             Failure {
                 place: format!("step {period}, {}", error.place),
                 reason: format!("{}{advice}", error.reason),
-                is_retryable: error.is_retryable,
+                cause: error.cause,
             }
         };
         let foreign = self.foreign(attachment).await.map_err(failed)?;

@@ -193,7 +193,7 @@ impl IngestError {
                 SinkCause::Store => Cause::Place,
                 SinkCause::Observations => Cause::Granule,
             },
-            Self::Foreign { source } if source.is_retryable => Cause::Passing,
+            Self::Foreign { source } if source.is_retryable() => Cause::Passing,
             Self::Changed { .. } | Self::Contended { .. } | Self::Spool { .. } | Self::Killed => {
                 Cause::Passing
             }

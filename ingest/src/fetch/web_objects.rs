@@ -80,7 +80,7 @@ impl WebObjects {
                 Err(failure) => failure,
             };
             let error = failed(&url, failure);
-            let pause = pauses.next().filter(|_| error.is_retryable);
+            let pause = pauses.next().filter(|_| error.is_retryable());
             let Some(pause) = pause else {
                 return Err(error);
             };
@@ -93,7 +93,7 @@ fn failed(url: &Url, failure: Miss) -> ForeignError {
     let place = shown(url);
     match failure {
         Miss::Away(reason) => ForeignError::away(place, reason),
-        Miss::Absent(reason) => ForeignError::refused(
+        Miss::Absent(reason) => ForeignError::denied(
             place,
             format!(
                 "{reason}: it is not given to whoever asks, and this program sends no credentials over HTTP"

@@ -107,7 +107,7 @@ fn index(indexes: &Indexes, array: &ForeignArray, dimension: Option<&str>) -> Op
 
 /// What stops a file for what a store of others answers.
 pub(crate) fn stopped(error: ForeignError) -> Stop {
-    if error.is_retryable {
+    if error.is_retryable() {
         return IngestError::Foreign { source: error }.into();
     }
     Rejection::new(RejectReason::Unreadable, error.place, error.reason).into()

@@ -23,7 +23,7 @@ use quick_cache::sync::Cache;
 use super::attachment::{Attachment, MAX_ATTACHMENT_BYTES};
 use super::reference::{MAX_REFERENCE_BYTES, Reference, named};
 use super::source::Source;
-use crate::failure::Failure;
+use crate::failure::{Cause, Failure};
 use crate::fields;
 use crate::off_thread::off_thread;
 use crate::parquet_table::shape_only;
@@ -127,7 +127,7 @@ impl Layer {
             failed(Failure {
                 place,
                 reason,
-                is_retryable: false,
+                cause: Cause::Content,
             })
         })?;
         if reference.is_none() {
@@ -166,7 +166,7 @@ impl Layer {
                     "the store has changed since it was attached: run `fluxglobe attach --refresh {}`",
                     place.product
                 ),
-                is_retryable: false,
+                cause: Cause::Content,
             })
         })
     }
@@ -181,7 +181,7 @@ impl Layer {
                 failed(Failure {
                     place: key.to_string(),
                     reason,
-                    is_retryable: false,
+                    cause: Cause::Content,
                 })
             };
             if found.meta.size > MAX_ATTACHMENT_BYTES {

@@ -7,6 +7,7 @@ use object_store::azure::{AzureConfigKey, MicrosoftAzureBuilder};
 use object_store::gcp::{GoogleCloudStorageBuilder, GoogleConfigKey};
 use object_store::{BackoffConfig, ClientConfigKey, ObjectStore, RetryConfig};
 
+use super::answers::Connector;
 use super::location::Cloud;
 use super::settings::{RetryLimits, Settings};
 
@@ -37,7 +38,19 @@ fn s3(bucket: &str, settings: &Settings) -> Result<Arc<dyn ObjectStore>, String>
     let has_identity = is_set(Key::WebIdentityTokenFile) && is_set(Key::RoleArn);
     let has_container = is_set(Key::ContainerCredentialsRelativeUri)
         || is_set(Key::ContainerCredentialsFullUri) && is_set(Key::ContainerAuthorizationTokenFile);
-    let is_unsigned = settings.is_on("AWS_SKIP_SIGNATURE");
+    let has_some = [
+        Key::AccessKeyId,
+        Key::SecretAccessKey,
+        Key::Token,
+        Key::WebIdentityTokenFile,
+        Key::RoleArn,
+        Key::ContainerCredentialsRelativeUri,
+        Key::ContainerCredentialsFullUri,
+        Key::MetadataEndpoint,
+    ]
+    .into_iter()
+    .any(is_set);
+    let is_unsigned = settings.is_on("AWS_SKIP_SIGNATURE") || settings.may_be_unsigned && !has_some;
     // Without any of these the library would ask an instance's metadata service, an address that must be meant.
     if !(has_keys || has_identity || has_container || is_unsigned || is_set(Key::MetadataEndpoint))
     {
@@ -64,6 +77,8 @@ fn s3(bucket: &str, settings: &Settings) -> Result<Arc<dyn ObjectStore>, String>
         .with_bucket_name(bucket)
         // Objects are created once: a store that cannot promise that is found out by `check_writable`.
         .with_config(Key::ConditionalPut, "etag")
+        .with_skip_signature(is_unsigned)
+        .with_http_connector(Connector)
         .with_retry(retries(settings.retry_limits))
         .build();
     Ok(Arc::new(store.map_err(|e| e.to_string())?))
@@ -79,8 +94,10 @@ fn google(bucket: &str, settings: &Settings) -> Result<Arc<dyn ObjectStore>, Str
     let has_account = is_set(Key::ServiceAccount)
         || is_set(Key::ServiceAccountKey)
         || is_set(Key::ApplicationCredentials);
-    let is_unsigned = settings.is_on("GOOGLE_SKIP_SIGNATURE");
-    if !(has_account || is_unsigned || settings.has_any(&["GCE_METADATA_HOST"])) {
+    let has_machine = settings.has_any(&["GCE_METADATA_HOST"]);
+    let is_unsigned = settings.is_on("GOOGLE_SKIP_SIGNATURE")
+        || settings.may_be_unsigned && !has_account && !has_machine;
+    if !(has_account || is_unsigned || has_machine) {
         return Err(
             "no credentials: set GOOGLE_APPLICATION_CREDENTIALS to the file of a service \
              account; for the account of the machine itself set \
@@ -100,6 +117,8 @@ fn google(bucket: &str, settings: &Settings) -> Result<Arc<dyn ObjectStore>, Str
     }
     let store = builder
         .with_bucket_name(bucket)
+        .with_skip_signature(is_unsigned)
+        .with_http_connector(Connector)
         .with_retry(retries(settings.retry_limits))
         .build();
     Ok(Arc::new(store.map_err(|e| e.to_string())?))
@@ -122,7 +141,12 @@ fn azure(container: &str, settings: &Settings) -> Result<Arc<dyn ObjectStore>, S
     let has_client = is_set(Key::ClientId)
         && is_set(Key::AuthorityId)
         && (is_set(Key::ClientSecret) || is_set(Key::FederatedTokenFile));
-    let is_unsigned = settings.is_on("AZURE_SKIP_SIGNATURE");
+    let has_some = has_key
+        || [Key::ClientId, Key::ClientSecret, Key::MsiEndpoint]
+            .into_iter()
+            .any(is_set);
+    let is_unsigned =
+        settings.is_on("AZURE_SKIP_SIGNATURE") || settings.may_be_unsigned && !has_some;
     if !(is_emulator || has_key || has_client || is_unsigned || is_set(Key::MsiEndpoint)) {
         return Err("no credentials: set AZURE_STORAGE_ACCOUNT_KEY or AZURE_STORAGE_SAS_KEY, or \
              AZURE_CLIENT_ID, AZURE_TENANT_ID and AZURE_CLIENT_SECRET; for the identity of the machine \
@@ -141,6 +165,8 @@ fn azure(container: &str, settings: &Settings) -> Result<Arc<dyn ObjectStore>, S
     }
     let store = builder
         .with_container_name(container)
+        .with_skip_signature(is_unsigned && !is_emulator)
+        .with_http_connector(Connector)
         .with_retry(retries(settings.retry_limits))
         .build();
     Ok(Arc::new(store.map_err(|e| e.to_string())?))
@@ -227,6 +253,22 @@ mod tests {
         assert!(refusal(Cloud::Azure, &[]).contains("AZURE_STORAGE_ACCOUNT_NAME"));
         let account = [("AZURE_STORAGE_ACCOUNT_NAME", "me")];
         assert!(refusal(Cloud::Azure, &account).contains("AZURE_STORAGE_ACCOUNT_KEY"));
+    }
+
+    #[test]
+    fn what_is_open_to_everybody_is_read_without_credentials_but_not_with_half_of_them() {
+        let account = [("AZURE_STORAGE_ACCOUNT_NAME", "me")];
+        for (cloud, variables) in [
+            (Cloud::S3, &[][..]),
+            (Cloud::Google, &[]),
+            (Cloud::Azure, &account),
+        ] {
+            open(cloud, "bucket", &settings(variables).as_anybody()).unwrap();
+            refusal(cloud, variables);
+        }
+        let half = settings(&[("AWS_ACCESS_KEY_ID", "me")]).as_anybody();
+        let reason = open(Cloud::S3, "bucket", &half).unwrap_err();
+        assert!(reason.contains("AWS_SECRET_ACCESS_KEY"), "{reason}");
     }
 
     #[test]

@@ -51,9 +51,20 @@ pub struct Settings {
     variables: BTreeMap<String, String>,
     /// How long the store is waited for.
     pub retry_limits: RetryLimits,
+    /// Is a cloud asked without a signature where there are no credentials for it?
+    pub(super) may_be_unsigned: bool,
 }
 
 impl Settings {
+    /// The same; where there are no credentials, requests are not signed: for what is open to everybody.
+    #[must_use]
+    pub fn as_anybody(self) -> Self {
+        Self {
+            may_be_unsigned: true,
+            ..self
+        }
+    }
+
     /// The variables of this process that a cloud's library knows (`AWS_*`, `GOOGLE_*`, `GCE_*`, `AZURE_*`,
     /// `IDENTITY_ENDPOINT`).
     pub fn from_environment() -> Self {
@@ -73,6 +84,7 @@ impl Settings {
                 .filter(|(name, value)| is_known(name) && !value.is_empty())
                 .collect(),
             retry_limits: RetryLimits::default(),
+            may_be_unsigned: false,
         }
     }
 
@@ -107,6 +119,7 @@ impl Debug for Settings {
         f.debug_struct("Settings")
             .field("variables", &self.variables.keys())
             .field("retry_limits", &self.retry_limits)
+            .field("may_be_unsigned", &self.may_be_unsigned)
             .finish()
     }
 }
