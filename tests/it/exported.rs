@@ -1,6 +1,7 @@
 //! Products that were exported, opened by others: xarray finds the values, times and places of the files they came from.
 
 use std::ffi::OsStr;
+use std::path::Path;
 use std::process::Command;
 
 use harness::program;
@@ -11,8 +12,12 @@ use crate::end_to_end::demo_data;
 
 /// What xarray finds in an exported product: what it compared, or what it found otherwise.
 fn compared(cube: impl AsRef<OsStr>) -> Result<Value, String> {
+    compared_by(&test_data::python(), cube)
+}
+
+fn compared_by(python: &Path, cube: impl AsRef<OsStr>) -> Result<Value, String> {
     let script = concat!(env!("CARGO_MANIFEST_DIR"), "/reference/exported_cube.py");
-    let run = Command::new(test_data::python())
+    let run = Command::new(python)
         .arg(script)
         .arg(cube.as_ref())
         .arg(test_data::fluxengine("takahashi09"))
@@ -68,6 +73,30 @@ fn xarray_finds_the_same_over_http() {
     }
     // The comparison sees another product.
     let error = compared(format!("{}/zarr/takahashi09-flux-accumulated", server.url)).unwrap_err();
+    assert!(error.contains("carbon_flux"), "{error}");
+}
+
+#[test]
+fn icechunk_finds_the_same_in_the_store_itself_and_in_a_copy() {
+    let python = test_data::interop_python();
+    let folder = tempfile::tempdir().unwrap();
+    let copy = folder.path().join("flux");
+    let words = [
+        "export",
+        "takahashi09-flux",
+        "--to",
+        "icechunk",
+        copy.to_str().unwrap(),
+    ];
+    program::succeed(demo_data(), &words).unwrap();
+    let cubes = demo_data().join("objects/cubes");
+    for cube in [cubes.join("takahashi09-flux"), copy] {
+        let found = compared_by(&python, &cube).unwrap();
+        assert_eq!(found["steps"], 12);
+        assert!(found["values"].as_u64().unwrap() > 400_000, "{found}");
+    }
+    // The comparison sees another product.
+    let error = compared_by(&python, cubes.join("takahashi09-flux-accumulated")).unwrap_err();
     assert!(error.contains("carbon_flux"), "{error}");
 }
 

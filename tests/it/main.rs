@@ -3,6 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "a test ends where it cannot go on")]
 
 mod animation;
+mod attached_bucket;
 mod bad_clients;
 mod bad_input;
 mod bench_serve;
@@ -13,6 +14,7 @@ mod dependencies;
 mod end_to_end;
 mod exported;
 mod harness_self;
+mod interop;
 mod logged;
 mod migrate;
 mod quality;

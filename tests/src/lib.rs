@@ -2,6 +2,7 @@
 
 pub mod camera;
 pub mod cluster;
+pub mod gate;
 pub mod granule;
 pub mod http;
 pub mod node;

@@ -23,8 +23,14 @@ pub struct Server {
 impl Server {
     /// Starts a server on a free port of this machine.
     pub fn start(data: &Path, words: &[&str]) -> Result<Self> {
+        Self::start_with(data, words, &[])
+    }
+
+    /// The same with variables of the environment.
+    pub fn start_with(data: &Path, words: &[&str], settings: &[(String, String)]) -> Result<Self> {
         let mut child = program::command(data)
             .args(words)
+            .envs(settings.iter().map(|(name, value)| (name, value)))
             .args(["--listen", "127.0.0.1:0"])
             .stderr(Stdio::piped())
             .spawn()?;

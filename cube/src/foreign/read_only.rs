@@ -35,6 +35,17 @@ fn read_only<T>() -> StorageResult<T> {
     Err(other("an attached store is only read".to_owned()))
 }
 
+/// What one state names is there as long as the state is.
+fn missing(name: &str) -> StorageError {
+    let folder = name.split_once('/').map(|(folder, _)| folder);
+    match folder {
+        Some("snapshots" | "manifests" | "chunks") => other(format!(
+            "{name} is not there: the state that needs it was let go (expired), or the repository is not whole"
+        )),
+        _ => StorageError::capture(StorageErrorKind::ObjectNotFound),
+    }
+}
+
 impl ReadOnly {
     async fn read(&self, name: &str, range: Option<&Range<u64>>) -> StorageResult<Bytes> {
         // What this program wrote has seals, which are of the whole; others write none.
@@ -45,8 +56,7 @@ impl ReadOnly {
             .map(GetRange::Bounded);
         let found = self.0.get(name, part, MAX_OBJECT_BYTES).await;
         let found = found.map_err(|e| other(e.to_string()))?;
-        let content =
-            found.ok_or_else(|| StorageError::capture(StorageErrorKind::ObjectNotFound))?;
+        let content = found.ok_or_else(|| missing(name))?;
         if !may_be_sealed {
             return Ok(content);
         }

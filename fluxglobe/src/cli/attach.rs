@@ -15,14 +15,22 @@ changed there since are an error and never a number. Nothing is written to the s
   Icechunk            a repository, alike; what is read is the state that its branch main had when it was attached, whatever is
                       committed there later
 
-Credentials for buckets come from the environment (AWS_*, GOOGLE_*, AZURE_*; docs/operations.md) and are not stored: whoever reads the
-product needs them too, and in a cluster every service needs the way to the store.
+Credentials for buckets come from the environment and are not stored: whoever reads the product needs them too, and in a cluster every
+service needs the way to the store. For S3 they are
+  AWS_ACCESS_KEY_ID, AWS_SECRET_ACCESS_KEY and, if there is one, AWS_SESSION_TOKEN
+  AWS_REGION (us-east-1)               the region of the bucket
+  AWS_ENDPOINT_URL                     another server than Amazon's; AWS_ALLOW_HTTP=true where it begins with http://
+Without any of the keys, or with AWS_SKIP_SIGNATURE=true, what is open to everybody is read. For gs:// and az:// the variables are GOOGLE_*
+and AZURE_*, alike. A bucket need not let itself be listed: then its metadata are to be consolidated, or what the array names is read.
+What is refused there (credentials that have ended, a bucket that is gone, a wrong region) is an error that says so with store, array and
+chunk; it is not taken for a chunk that was never written.
 
 What came since, or was revised, comes with --refresh, as the product's next version. A product that was landed is not attached over.
 
 Examples:
   fluxglobe attach /data/sst.zarr --variable analysed_sst --product sst-attached
   fluxglobe attach s3://BUCKET/flux.icechunk --variable fgco2
+  AWS_REGION=us-west-2 fluxglobe attach s3://PUBLIC-BUCKET/sst.zarr --variable analysed_sst
   fluxglobe attach /data/ocean.zarr --variable thetao --index depth=0
   fluxglobe attach --refresh sst-attached")]
 pub(crate) struct Attach {

@@ -7,8 +7,8 @@ use anyhow::Result;
 use compute::gc::Computed;
 use ingest::{LandingNotes, Readings};
 use observations::Datasets;
-use storage::Store;
 use storage::gc::{self, Keep, Owner, Pictures, Versions};
+use storage::{Store, manifests};
 
 use crate::cli::{Gc, Settings};
 use crate::command::notice;
@@ -38,6 +38,7 @@ pub(crate) async fn run(settings: &Settings, options: &Gc) -> Result<()> {
     for leftover in &plan.leftovers {
         progress::result(&format!("{} {}", leftover.path, leftover.size_bytes))?;
     }
+    say_attached(&store).await?;
     let summary = format!(
         "{} objects, {} half-written files, {:.1} MB; {} stay",
         plan.garbage.len(),
@@ -54,6 +55,22 @@ pub(crate) async fn run(settings: &Settings, options: &Gc) -> Result<()> {
     gc::run(&store, &OWNERS, &plan, keep, &progress).await?;
     progress::done(&bar, &summary);
     cubes(&store, keep, false).await
+}
+
+/// A line for each product whose values lie elsewhere.
+async fn say_attached(store: &Store) -> Result<()> {
+    for product in manifests::products(store).await? {
+        let Some(newest) = manifests::latest(store, &product).await? else {
+            continue;
+        };
+        if let Some(attachment) = store.attached_to(&newest).await? {
+            progress::say(&format!(
+                "{product} is attached to {}: of it only references are here; nothing is looked at or removed there",
+                attachment.place()
+            ));
+        }
+    }
+    Ok(())
 }
 
 /// Cleans cubes, after the manifests that they follow; a line for each that had something to remove.

@@ -84,7 +84,8 @@ async fn without_attached(store: &Store, all: Vec<ProductId>) -> Result<Vec<Prod
         };
         match attached {
             Some(attachment) => progress::say(&format!(
-                "{product} is attached to {}: its values are not copied, and it has no cube",
+                "{product} is attached to {}: its values stay there, and there is nothing to bring over (a copy: fluxglobe export {product} --to \
+                 icechunk PLACE)",
                 attachment.place()
             )),
             None => here.push(product),

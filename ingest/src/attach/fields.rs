@@ -83,8 +83,14 @@ impl Source for ForeignFields {
                 ),
                 Cause::Access | Cause::Away => String::new(),
             };
+            // What is wrong with the store is wrong with the array.
+            let array = if error.place.contains(" array ") {
+                String::new()
+            } else {
+                format!(" array {}", attachment.array)
+            };
             Failure {
-                place: format!("step {period}, {}", error.place),
+                place: format!("step {period}, {}{array}", error.place),
                 reason: format!("{}{advice}", error.reason),
                 cause: error.cause,
             }

@@ -63,13 +63,23 @@ pub fn fluxengine_land() -> PathBuf {
 /// # Panics
 /// If `deploy/install-tools.sh test` has not made it.
 pub fn python() -> PathBuf {
+    environment("bin/python")
+}
+
+/// The Python that reads products as others do, with Icechunk 2.
+///
+/// # Panics
+/// If `deploy/install-tools.sh test` has not made it.
+pub fn interop_python() -> PathBuf {
+    environment("interop/bin/python")
+}
+
+fn environment(python: &str) -> PathBuf {
     let tools = variable("FLUXGLOBE_TOOLS").or_else(|| {
         let home = variable("HOME")?;
         Some(home.join(".cache/fluxglobe/tools"))
     });
-    let python = tools
-        .expect("HOME or FLUXGLOBE_TOOLS is set")
-        .join("bin/python");
+    let python = tools.expect("HOME or FLUXGLOBE_TOOLS is set").join(python);
     assert!(
         python.is_file(),
         "there is no {}: `make test` makes it; by hand: deploy/install-tools.sh test",
