@@ -514,6 +514,7 @@ fn a_service_reads_again_once_it_is_let_in_again() {
 
 /// The product's own cube in a bucket, as a repository of somebody else's whose branch moves.
 #[test]
+#[expect(clippy::too_many_lines, reason = "one story of a store that goes on")]
 fn a_repository_in_a_bucket_is_read_as_it_was_attached_while_its_branch_moves() {
     let bucket = Bucket::new("moving");
     let owner = |words: &[&str]| {
