@@ -462,8 +462,8 @@ async fn commit(engine: &Engine, mut computed: Manifest) -> Result<Manifest, Com
         }
         computed.number = number;
         match manifests::commit(store, &computed).await {
-            Ok(()) => {
-                cube::keep_up(store, &computed).await;
+            Ok(version) => {
+                cube::keep_up_as(store, &computed, &version).await;
                 return Ok(computed);
             }
             Err(StorageError::Conflict { .. }) if attempt < COMMIT_ATTEMPTS => attempt += 1,

@@ -215,8 +215,8 @@ async fn commit(
             ..derived.clone()
         };
         match manifests::commit(engine.store(), &manifest).await {
-            Ok(()) => {
-                cube::keep_up(engine.store(), &manifest).await;
+            Ok(version) => {
+                cube::keep_up_as(engine.store(), &manifest, &version).await;
                 return Ok(manifest);
             }
             Err(StorageError::Conflict { .. }) if attempt < COMMIT_ATTEMPTS => attempt += 1,

@@ -85,52 +85,81 @@ struct Compaction<'a> {
 }
 
 impl Compaction<'_> {
-    /// Sends all shards of the run, one after the other.
+    /// Sends all shards of the run: values of the next one are read while one is encoded.
     async fn shards(&self) -> Result<Made, CubeError> {
         let session = self.repository.session().await?;
         let (series, sums) = (self.series_path()?, self.sums_path()?);
         let mut made = Made::default();
-        for shard in self.encoder.shards() {
-            let [values, records] = self.encoded(shard).await?;
+        let mut left = self.encoder.shards().into_iter();
+        let mut coming = left.next();
+        let mut values = self.values(coming).await?;
+        while let Some(shard) = coming {
+            coming = left.next();
+            let place = async {
+                let [values, records] = self.encoded(shard, values).await?;
+                let series = async {
+                    let at = (&series, RunAxis::First.index(shard, self.run));
+                    let sent = self.send(&session, at, values).await?;
+                    Ok::<_, CubeError>((shard, sent))
+                };
+                let sums = async {
+                    let at = (&sums, RunAxis::Last.index(shard, self.run));
+                    let sent = self.send(&session, at, records).await?;
+                    Ok::<_, CubeError>((shard, sent))
+                };
+                tokio::try_join!(series, sums)
+            };
+            let (sent, next) = tokio::try_join!(place, self.values(coming))?;
             if !self.has_series {
-                let place = (&series, RunAxis::First.index(shard, self.run));
-                let sent = self.send(&session, place, values).await?;
-                made.series.push((shard, sent));
+                made.series.push(sent.0);
             }
             if self.basis.is_some() {
-                let place = (&sums, RunAxis::Last.index(shard, self.run));
-                let sent = self.send(&session, place, records).await?;
-                made.sums.push((shard, sent));
+                made.sums.push(sent.1);
             }
+            values = next;
         }
         Ok(made)
     }
 
-    /// A shard of the time-major copy and that of sums; none where no cell has data, or where it is not made.
-    async fn encoded(&self, shard: [u32; 2]) -> Result<[Option<Bytes>; 2], CubeError> {
+    /// Values of a shard, `[step, row, col]`; none where no cell has data.
+    async fn values(&self, shard: Option<[u32; 2]>) -> Result<Option<Vec<f32>>, CubeError> {
         let (cube, run) = (self.cube, self.run);
-        let values = if self.has_series {
-            cube.shard(run, shard).await?
-        } else {
-            let held = series::steps_of(run, cube.steps()).len();
-            Some(stacked(cube, &self.encoder, (run, held), shard).await?)
-        };
-        let Some(values) = values else {
+        let Some(shard) = shard else { return Ok(None) };
+        if self.has_series {
+            return cube.shard(run, shard).await;
+        }
+        let held = series::steps_of(run, cube.steps()).len();
+        stacked(cube, &self.encoder, (run, held), shard)
+            .await
+            .map(Some)
+    }
+
+    /// A shard of the time-major copy and that of sums, a thread each; none where no cell has data, or where it is not made.
+    async fn encoded(
+        &self,
+        shard: [u32; 2],
+        values: Option<Vec<f32>>,
+    ) -> Result<[Option<Bytes>; 2], CubeError> {
+        let Some(values) = values.map(Arc::new) else {
             return Ok([None, None]);
         };
-        let (encoder, basis) = (Arc::clone(&self.encoder), self.basis.clone());
+        let (encoder, own) = (Arc::clone(&self.encoder), Arc::clone(&values));
         let has_series = self.has_series;
-        let encoded = tokio::task::spawn_blocking(move || {
-            let records = basis.map(|basis| encoder.records(&values, shard, &basis));
-            let records = records.map(|records| encoder.encode_records(records));
-            let values = if has_series {
-                None
-            } else {
-                encoder.encode(values)?
-            };
-            Ok([values, records.transpose()?.flatten()])
+        let series = tokio::task::spawn_blocking(move || {
+            if has_series {
+                return Ok(None);
+            }
+            encoder.encode(&own)
         });
-        encoded.await.map_err(|e| thread(&e))?
+        let (encoder, basis) = (Arc::clone(&self.encoder), self.basis.clone());
+        let sums = tokio::task::spawn_blocking(move || {
+            let records = basis.map(|basis| encoder.records(&values, shard, &basis));
+            drop(values);
+            let encoded = records.map(|records| encoder.encode_records(&records));
+            Ok::<_, CubeError>(encoded.transpose()?.flatten())
+        });
+        let (series, sums) = tokio::try_join!(series, sums).map_err(|e| thread(&e))?;
+        Ok([series?, sums?])
     }
 
     async fn send(

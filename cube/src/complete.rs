@@ -104,7 +104,12 @@ async fn placed(
         }
         drop(session);
         levels
-            .write(&state.session, &arrays, description, (&made_of, count))
+            .write(
+                &state.session,
+                &arrays,
+                description,
+                (&made_of, &state.steps, count),
+            )
             .await?;
         let mut session = state.session.write().await;
         match session.commit("levels").execute().await {

@@ -138,15 +138,16 @@ impl<T: Number> Encoder<T> {
         }
         Ok(EncodedObject {
             index,
-            content: Some(object(&self.definition, cells)?),
+            content: Some(object(&self.definition, &cells)?),
         })
     }
 }
 
 /// Encodes the values of one object of an array, all of them.
-fn object<T: Element>(array: &Definition, values: Vec<T>) -> Result<Bytes, CubeError> {
+fn object<T: Element>(array: &Definition, values: &[T]) -> Result<Bytes, CubeError> {
     let failed = |e: String| CubeError::library(&arrays::name(array), "encoding", e);
-    let bytes = T::into_array_bytes(array.data_type(), values);
+    // By reference: a shard of runs is a hundred megabytes.
+    let bytes = T::to_array_bytes(array.data_type(), values);
     let bytes = bytes.map_err(|e| failed(e.to_string()))?;
     let shape = array.chunk_shape(&[0, 0, 0]);
     let shape = shape.map_err(|e| failed(e.to_string()))?;
@@ -211,7 +212,7 @@ impl SeriesEncoder {
     }
 
     /// Encodes a shard of `values`, `[step, row, col]`; none where no cell has data.
-    pub(crate) fn encode(&self, values: Vec<f32>) -> Result<Option<Bytes>, CubeError> {
+    pub(crate) fn encode(&self, values: &[f32]) -> Result<Option<Bytes>, CubeError> {
         if values.iter().all(|value| value.is_nan()) {
             return Ok(None);
         }
@@ -226,7 +227,7 @@ impl SeriesEncoder {
     }
 
     /// Encodes the records of a shard; none where no cell has data.
-    pub(crate) fn encode_records(&self, records: Vec<u8>) -> Result<Option<Bytes>, CubeError> {
+    pub(crate) fn encode_records(&self, records: &[u8]) -> Result<Option<Bytes>, CubeError> {
         if records.iter().all(|byte| *byte == 0) {
             return Ok(None);
         }

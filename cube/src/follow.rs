@@ -5,6 +5,7 @@
 //! has no name in the cube.
 
 use std::collections::BTreeMap;
+use std::num::NonZeroUsize;
 use std::sync::Arc;
 
 use contract::digest::Digest;
@@ -30,12 +31,16 @@ use crate::{CubeError, Description, Edit, Repository, Step, background};
 const WAY_BYTES: usize = 128 << 20;
 /// Bytes of a cell on its way: as it is stored, in its pages, as a map and in its chunks.
 const CELL_BYTES: usize = 16;
-/// Most fields on their way: more only wait for each other.
+/// Most fields on their way.
 const MOST_AT_ONCE: usize = 8;
+/// Of these how many may wait for the store while processors work on others: more only wait for each other.
+const WAITING: usize = 2;
 
 /// Fields of a grid that are read, encoded and sent at a time.
 fn at_once(grid: &Grid) -> usize {
-    (WAY_BYTES / (grid.cell_count() * CELL_BYTES).max(1)).clamp(1, MOST_AT_ONCE)
+    let processors = std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
+    let most = MOST_AT_ONCE.min(processors + WAITING);
+    (WAY_BYTES / (grid.cell_count() * CELL_BYTES).max(1)).clamp(1, most)
 }
 
 async fn digest_of(grid: Grid, values: &Arc<[f32]>, period: Period) -> Result<Digest, CubeError> {
@@ -56,15 +61,21 @@ pub fn follow<'a>(
     store: &'a Store,
     manifest: &'a Manifest,
 ) -> BoxFuture<'a, Result<Followed, CubeError>> {
-    Box::pin(async move {
-        let follower = Follower {
-            store,
-            folder: &folder(&manifest.product),
-            fields: store,
-            told: &|_period| (),
-        };
-        follower.run(manifest).await
-    })
+    Box::pin(async move { follow_as(store, manifest, manifest.id()).await })
+}
+
+async fn follow_as(
+    store: &Store,
+    manifest: &Manifest,
+    version: ManifestId,
+) -> Result<Followed, CubeError> {
+    let follower = Follower {
+        store,
+        folder: &folder(&manifest.product),
+        fields: store,
+        told: &|_period| (),
+    };
+    follower.run_as(manifest, version).await
 }
 
 /// The same for whoever has just published a version, or found that it was published before and not told of.
@@ -76,23 +87,32 @@ pub fn follow<'a>(
 ///
 /// Complete runs of steps are then made time-major, which nobody waits for but [`crate::compacted`].
 pub fn keep_up<'a>(store: &'a Store, manifest: &'a Manifest) -> BoxFuture<'a, ()> {
+    Box::pin(async move { keep_up_as(store, manifest, &manifest.id()).await })
+}
+
+/// The same for who knows the name of the version, which takes longer to compute the more steps there are.
+pub fn keep_up_as<'a>(
+    store: &'a Store,
+    manifest: &'a Manifest,
+    version: &'a ManifestId,
+) -> BoxFuture<'a, ()> {
     Box::pin(async move {
         match store.attached_to(manifest).await {
             // A cube is a copy of values, and these are not to be copied.
             Ok(Some(attachment)) => {
-                let (version, place) = (manifest.id(), attachment.place());
+                let place = attachment.place();
                 tracing::debug!(%version, place, "an attached product has no cube");
                 return;
             }
             Ok(None) => {}
             Err(error) => {
-                tracing::warn!(version = %manifest.id(), %error, "the cube stays behind");
+                tracing::warn!(%version, %error, "the cube stays behind");
                 return;
             }
         }
-        let (own, version) = (store.clone(), manifest.clone());
+        let (own, steps, name) = (store.clone(), manifest.clone(), version.clone());
         // A task of its own: a panic over a damaged cube ends there.
-        let followed = tokio::spawn(async move { follow(&own, &version).await });
+        let followed = tokio::spawn(async move { follow_as(&own, &steps, name).await });
         let error = match followed.await {
             Ok(Ok(_followed)) => {
                 return background::begin(store.clone(), folder(&manifest.product));
@@ -100,7 +120,7 @@ pub fn keep_up<'a>(store: &'a Store, manifest: &'a Manifest) -> BoxFuture<'a, ()
             Ok(Err(error)) => error.to_string(),
             Err(error) => error.to_string(),
         };
-        tracing::warn!(version = %manifest.id(), %error, "the cube stays behind; its next version, or `fluxglobe recompute --product PRODUCT --verify`, brings it up");
+        tracing::warn!(%version, %error, "the cube stays behind; its next version, or `fluxglobe recompute --product PRODUCT --verify`, brings it up");
     })
 }
 
@@ -132,8 +152,16 @@ impl Follower<'_> {
     /// # Errors
     /// `Foreign` if the cube is of another version of this number, or of another product. A field that cannot be read.
     pub fn run<'a>(&'a self, manifest: &'a Manifest) -> BoxFuture<'a, Result<Followed, CubeError>> {
+        self.run_as(manifest, manifest.id())
+    }
+
+    /// The same for who knows the name of the version.
+    fn run_as<'a>(
+        &'a self,
+        manifest: &'a Manifest,
+        version: ManifestId,
+    ) -> BoxFuture<'a, Result<Followed, CubeError>> {
         Box::pin(async move {
-            let version = manifest.id();
             let description = Description::named(manifest, version.clone());
             let repository = Repository::for_change(self.store, self.folder, &description).await?;
             let mut edit = Edit::describing(&repository, description.clone()).await?;

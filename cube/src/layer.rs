@@ -81,9 +81,10 @@ impl Layer<'_> {
         }
         if self.parts.has_levels() {
             let (made_of, first) = (self.made_of(levels), first.unwrap_or(plan.steps.len()));
-            levels
-                .write(&state.session, &arrays, description, (&made_of, first))
-                .await?;
+            let after = (&made_of[..], &plan.steps[..], first);
+            // Boxed: what it awaits would make every future large that awaits a commit.
+            let written = levels.write(&state.session, &arrays, description, after);
+            Box::pin(written).await?;
         }
         let mut session = state.session.write().await;
         let properties = description.version.as_ref().map(|version| {

@@ -136,20 +136,36 @@ impl Levels {
     }
 
     /// Says of which steps levels are there, in the place of what was said: `after` has one for each step. Times of levels are
-    /// those of the cube, by reference, from the first step on that is another one.
+    /// those of the cube, by reference, from the first step on that is another one, and so are digests where all steps of a chunk have
+    /// levels.
     pub(crate) async fn write(
         &self,
         session: &RwLock<Session>,
         store: &Arc<AsyncIcechunkStore>,
         description: &Description,
-        (after, first_step): (&[Option<MadeOf>], usize),
+        (after, steps, first_step): (&[Option<MadeOf>], &[Step], usize),
     ) -> Result<(), CubeError> {
         let mut pairs = self.made_of.iter().zip(after);
         let differs = pairs.position(|(before, after)| before != after);
         let first = differs.unwrap_or(self.made_of.len().min(after.len()));
         let names = after.iter().map(|own| own.map(|own| own.values_sha256));
         let names: Vec<Option<Digest>> = names.collect();
-        names::write(store, arrays::level_names(after.len())?, &names, first).await?;
+        let array = arrays::level_names(after.len())?;
+        let own = arrays::axis(description.quantity, steps.len() as u64)?;
+        let in_chunk = axis::chunk_steps(&array)?;
+        let of_chunk = |chunk: usize| {
+            let places = chunk * in_chunk..names.len().min((chunk + 1) * in_chunk);
+            let mut pairs = names[places.clone()].iter().zip(&steps[places]);
+            pairs.all(|(name, step)| *name == Some(step.values_sha256))
+        };
+        names::write(store, array, (&names, first), &of_chunk).await?;
+        let array = arrays::level_names(after.len())?;
+        for chunk in first / in_chunk..names.len().div_ceil(in_chunk) {
+            if of_chunk(chunk) {
+                let places = chunk * in_chunk..(chunk + 1) * in_chunk;
+                refer(session, &own.digests, &array, places).await?;
+            }
+        }
         let ranges = after
             .iter()
             .flat_map(|own| own.map_or([0.0; 2], |own| own.range));
@@ -162,8 +178,7 @@ impl Levels {
         } else {
             0
         };
-        let steps = after.len();
-        let own = arrays::axis(description.quantity, steps as u64)?;
+        let steps = steps.len();
         for level in level::levels(&description.grid) {
             let copies = arrays::level_axis(&level, description.quantity, steps as u64)?;
             for (from, to) in [&own.time, &own.bounds].into_iter().zip(copies) {

@@ -63,7 +63,7 @@ pub use edit::{Committed, Edit};
 pub use encoded_sums::EncodedSums;
 pub use error::CubeError;
 pub use field_bands::FieldBands;
-pub use follow::{Followed, Follower, folder, follow, keep_up};
+pub use follow::{Followed, Follower, folder, follow, keep_up, keep_up_as};
 pub use joined::{joined_window, range_of_field};
 pub use joining::WHOLLY_COVERED;
 pub use keys::Keys;

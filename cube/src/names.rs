@@ -43,12 +43,12 @@ where
     Ok(chunks.map(digest).collect())
 }
 
-/// Writes those from one on, and how many there are.
+/// Writes those from one on, and how many there are; no chunk of those that `is_elsewhere` says of that another array holds the same.
 pub(crate) async fn write<S>(
     store: &Arc<S>,
     definition: Definition,
-    names: &[Option<Digest>],
-    first: usize,
+    (names, first): (&[Option<Digest>], usize),
+    is_elsewhere: &(dyn Fn(usize) -> bool + Send + Sync),
 ) -> Result<(), CubeError>
 where
     S: AsyncWritableStorageTraits + 'static,
@@ -58,7 +58,8 @@ where
     let stored = array.async_store_metadata().await;
     stored.map_err(|e| failed(e.to_string()))?;
     let in_chunk = DIGEST_CHUNK as usize;
-    for (chunk, names) in names.chunks(in_chunk).enumerate().skip(first / in_chunk) {
+    let chunks = names.chunks(in_chunk).enumerate().skip(first / in_chunk);
+    for (chunk, names) in chunks.filter(|(chunk, _)| !is_elsewhere(*chunk)) {
         let bytes = names.iter().flat_map(|name| match name {
             Some(name) => *name.as_bytes(),
             None => [0; DIGEST_BYTES as usize],

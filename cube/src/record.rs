@@ -51,19 +51,24 @@ impl Record {
         header.fill(0);
         header[0] = if self.is_summed { 0 } else { UNSUMMED };
         let mut planes = out.chunks_exact_mut(RUN_STEPS);
-        let mut put = |count: usize, byte: &dyn Fn(usize, usize) -> u8| {
-            for place in 0..count {
-                let Some(plane) = planes.next() else { return };
-                for (step, own) in plane.iter_mut().enumerate() {
-                    *own = byte(step, place);
+        let mut put = |count: usize, word: &dyn Fn(usize) -> u64| {
+            let mut words = [0; RUN_STEPS];
+            for (step, own) in words.iter_mut().enumerate() {
+                *own = word(step);
+            }
+            for (place, plane) in planes.by_ref().take(count).enumerate() {
+                for (own, word) in plane.iter_mut().zip(&words) {
+                    *own = (word >> (8 * place)) as u8;
                 }
             }
         };
-        put(8, &|step, place| self.valid[step].to_le_bytes()[place]);
-        put(4, &|step, place| self.counts[step].to_le_bytes()[place]);
-        put(8, &|step, place| self.weights[step].to_le_bytes()[place]);
-        put(16, &|step, place| self.sums[step].to_le_bytes()[place]);
-        put(16, &|step, place| self.squares[step].to_le_bytes()[place]);
+        put(8, &|step| self.valid[step]);
+        put(4, &|step| self.counts[step].into());
+        put(8, &|step| self.weights[step].cast_unsigned());
+        for sums in [&self.sums, &self.squares] {
+            put(8, &|step| sums[step] as u64);
+            put(8, &|step| (sums[step] >> 64) as u64);
+        }
     }
 
     /// Reads one of [`RECORD_BYTES`] bytes; squares stay what they are unless they are wanted.

@@ -108,6 +108,15 @@ impl Scale {
         nearest(steps * steps * Self::squares_per_step())
     }
 
+    /// The same of many values: what is equal for all is computed once.
+    pub(crate) fn counter(self) -> Counter {
+        Counter {
+            zero: self.zero,
+            steps_per_value: self.steps_per_value(),
+            squares_per_step: Self::squares_per_step(),
+        }
+    }
+
     /// Can a value be summed? Infinite ones cannot.
     pub fn holds(self, value: f32) -> bool {
         (f64::from(value) - self.zero).abs() <= LIMIT * self.unit()
@@ -130,6 +139,26 @@ impl Scale {
         let mean = self.deviation(sum, weight);
         // Rounding may leave a constant a hair below zero.
         (of_squares - mean * mean).max(0.0).sqrt()
+    }
+}
+
+/// Counts values in steps of a scale.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Counter {
+    zero: f64,
+    steps_per_value: f64,
+    squares_per_step: f64,
+}
+
+impl Counter {
+    /// What [`Scale::steps`] and [`Scale::square_steps`] are of a value.
+    #[inline]
+    pub(crate) fn of(self, value: f32) -> [i64; 2] {
+        let steps = (f64::from(value) - self.zero) * self.steps_per_value;
+        [
+            nearest(steps),
+            nearest(steps * steps * self.squares_per_step),
+        ]
     }
 }
 
@@ -200,6 +229,19 @@ mod tests {
             2.25e15,
         ] {
             assert_eq!(nearest(number), number.round_ties_even() as i64, "{number}");
+        }
+    }
+
+    #[test]
+    fn a_counter_counts_as_its_scale_does() {
+        for quantity in Quantity::ALL {
+            let scale = Scale::of(quantity).unwrap();
+            let (low, high) = quantity.plausible().into_inner();
+            for share in 0..50 {
+                let value = (low + (high - low) * f64::from(share) / 49.0) as f32;
+                let own = [scale.steps(value), scale.square_steps(value)];
+                assert_eq!(scale.counter().of(value), own, "{quantity:?} {value}");
+            }
         }
     }
 

@@ -2,7 +2,7 @@
 
 use crate::layout::{BLOCK_CELLS, RUN_STEPS};
 use crate::record::{RECORD_BYTES, Record};
-use crate::scale::Scale;
+use crate::scale::{Counter, Scale};
 
 const SIDE: usize = BLOCK_CELLS as usize;
 
@@ -39,6 +39,7 @@ pub(crate) fn records(values: &[f32], cols: usize, row_weights: &[i64], scale: S
 /// Sums of cells of a row, which weigh the same, before they are multiplied.
 struct Row {
     scale: Scale,
+    counter: Counter,
     counts: [u32; RUN_STEPS],
     sums: [i64; RUN_STEPS],
     squares: [i64; RUN_STEPS],
@@ -48,6 +49,7 @@ impl Row {
     fn new(scale: Scale) -> Self {
         Self {
             scale,
+            counter: scale.counter(),
             counts: [0; RUN_STEPS],
             sums: [0; RUN_STEPS],
             squares: [0; RUN_STEPS],
@@ -65,7 +67,7 @@ impl Row {
                 let is_there = !value.is_nan();
                 record.valid[step] |= u64::from(is_there) << (first_cell + cell);
                 self.counts[step] += u32::from(is_there);
-                let (steps, squares) = (self.scale.steps(*value), self.scale.square_steps(*value));
+                let [steps, squares] = self.counter.of(*value);
                 // What is beyond anything physical is found below.
                 self.sums[step] = self.sums[step].wrapping_add(if is_there { steps } else { 0 });
                 let square = if is_there { squares } else { 0 };

@@ -1,6 +1,8 @@
-//! [`Plan`] in, the bands of each step out: values of some rows on the stored grid, in the stored unit.
+//! [`Plan`] in, the bands of each step out: values of some rows on the stored grid, in the stored unit. What the reader gives is
+//! turned by whoever works on it, while the reader goes on.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use contract::masked::MaskedCells;
 use contract::quantity::Quantity;
@@ -32,38 +34,107 @@ fn file_rows(mapping: &Mapping, rows: &Range<u32>) -> (u64, u64) {
     (u64::from(*first), u64::from(last - first) + 1)
 }
 
+/// Some rows of one step as they lie in the file.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct RawBand {
+    step: PlannedStep,
+    rows: Range<u32>,
+    /// Stored numbers of the latitudes of the file that hold the rows, and of all longitudes, in the order of the file.
+    stored: Vec<f64>,
+    /// Is each of them good enough? None if nobody asks.
+    is_good: Option<Vec<bool>>,
+}
+
 /// Reads and turns some rows of one step.
 pub(crate) async fn run(
     plan: &mut Plan,
     step: PlannedStep,
     rows: Range<u32>,
 ) -> Result<DecodedBand, Stop> {
+    let raw = read(plan, (step, rows), None).await?;
+    Ok(Conversion::of(plan).band(raw))
+}
+
+/// Reads some rows of one step; what the reader is to give after them it is told before it is waited for.
+pub(crate) async fn read(
+    plan: &mut Plan,
+    (step, rows): (PlannedStep, Range<u32>),
+    next: Option<(PlannedStep, Range<u32>)>,
+) -> Result<RawBand, Stop> {
     let slab = Slab::of(&plan.mapping, step, &rows);
+    slab.ask(plan).await?;
+    if let Some((step, rows)) = next {
+        Slab::of(&plan.mapping, step, &rows).ask(plan).await?;
+    }
     let is_good = is_good(plan, slab).await?;
-    let axes = &plan.axes;
-    let mut stored = slab
-        .read(&mut plan.values, &plan.variable.name, axes)
-        .await?;
-    let mut masked = MaskedCells::default();
-    let cells = stored.iter_mut().zip(is_good.iter().flatten());
-    for (stored, _) in cells.filter(|(_, is_good)| !**is_good) {
-        let is_value = matches!(plan.packing.unpacked(*stored), Unpacked::Value(_));
-        masked.poor_quality += u64::from(is_value);
-        *stored = f64::NAN;
-    }
-    let packing = &plan.packing;
-    let mut ends = Ends::default();
-    if matches!(plan.target.quantity, Quantity::Open(_)) && plan.recipe.profile.is_none() {
-        let is_value = |stored: &&f64| matches!(packing.unpacked(**stored), Unpacked::Value(_));
-        stored.iter().filter(is_value).for_each(|v| ends.add(*v));
-    }
-    let lies = (axes.as_slice(), &plan.mapping);
-    let values = converted(lies, packing, (step, rows), &stored, &mut masked);
-    Ok(DecodedBand {
-        values,
-        masked,
-        ends,
+    let (variable, axes) = (&plan.variable.name, &plan.axes);
+    let stored = slab.read(&mut plan.values, variable, axes).await?;
+    Ok(RawBand {
+        step,
+        rows,
+        stored,
+        is_good,
     })
+}
+
+/// What stored numbers of a file become; clones share it.
+#[derive(Debug, Clone)]
+pub(crate) struct Conversion(Arc<Converted>);
+
+#[derive(Debug)]
+struct Converted {
+    axes: Vec<Axis>,
+    mapping: Mapping,
+    packing: Packing,
+    /// May one of the stored numbers mean no data though nothing says so?
+    has_ends: bool,
+}
+
+impl Conversion {
+    pub(crate) fn of(plan: &Plan) -> Self {
+        let is_open = matches!(plan.target.quantity, Quantity::Open(_));
+        Self(Arc::new(Converted {
+            axes: plan.axes.clone(),
+            mapping: plan.mapping.clone(),
+            packing: plan.packing.clone(),
+            has_ends: is_open && plan.recipe.profile.is_none(),
+        }))
+    }
+
+    /// Turns rows of one step.
+    pub(crate) fn band(&self, raw: RawBand) -> DecodedBand {
+        let Converted {
+            axes,
+            mapping,
+            packing,
+            has_ends,
+        } = &*self.0;
+        let RawBand {
+            step,
+            rows,
+            mut stored,
+            is_good,
+        } = raw;
+        let is_value = |stored: f64| matches!(packing.unpacked(stored), Unpacked::Value(_));
+        let mut masked = MaskedCells::default();
+        let cells = stored.iter_mut().zip(is_good.iter().flatten());
+        for (stored, _) in cells.filter(|(_, is_good)| !**is_good) {
+            masked.poor_quality += u64::from(is_value(*stored));
+            *stored = f64::NAN;
+        }
+        let mut ends = Ends::default();
+        if *has_ends {
+            let valued = stored.iter().filter(|stored| is_value(**stored));
+            valued.for_each(|stored| ends.add(*stored));
+        }
+        let lies = (axes.as_slice(), mapping);
+        let values = converted(lies, packing, (step, rows), &stored, &mut masked);
+        DecodedBand {
+            values,
+            masked,
+            ends,
+        }
+    }
 }
 
 /// Values of some rows on the stored grid, in the stored unit, from a part of a map as it lies in a file.
@@ -116,6 +187,16 @@ impl Slab {
         Self { step, first, count }
     }
 
+    /// Tells the reader that all of it will be read, in the order in which it will.
+    async fn ask(self, plan: &mut Plan) -> Result<(), Stop> {
+        if let Some(quality) = &plan.quality {
+            let (part, _) = self.parts(&quality.axes);
+            plan.values.ask(&quality.variable, &part).await?;
+        }
+        let (part, _) = self.parts(&plan.axes);
+        plan.values.ask(&plan.variable.name, &part).await
+    }
+
     /// Its values of a variable as stored, in the order of the file.
     async fn read(
         self,
@@ -123,13 +204,19 @@ impl Slab {
         variable: &str,
         axes: &[Axis],
     ) -> Result<Vec<f64>, Stop> {
-        let part: Vec<Part> = axes.iter().map(|axis| self.part(axis)).collect();
+        let (part, count) = self.parts(axes);
+        values.read(variable, &part, count).await
+    }
+
+    /// What of each axis it is, and how many values.
+    fn parts(self, axes: &[Axis]) -> (Vec<Part>, u64) {
+        let part = axes.iter().map(|axis| self.part(axis)).collect();
         let lens = axes.iter().map(|axis| match axis.role {
             Role::Latitude => self.count,
             Role::Longitude => axis.len,
             Role::Time | Role::Other => 1,
         });
-        values.read(variable, &part, lens.product()).await
+        (part, lens.product())
     }
 
     /// What of an axis it is.

@@ -61,9 +61,7 @@ impl Cells {
     /// # Panics
     /// The map has not so many.
     pub fn add_valued(&mut self, first: usize, values: &[f32]) {
-        for (cell, value) in (first..).zip(values) {
-            self.words[cell / WORD_BITS] |= u64::from(!value.is_nan()) << (cell % WORD_BITS);
-        }
+        self.each_word(first, values, |word, valued| *word |= valued);
     }
 
     /// Takes those of the cells from `first` on away that hold a value.
@@ -71,8 +69,21 @@ impl Cells {
     /// # Panics
     /// The map has not so many.
     pub fn remove_valued(&mut self, first: usize, values: &[f32]) {
-        for (cell, value) in (first..).zip(values) {
-            self.words[cell / WORD_BITS] &= !(u64::from(!value.is_nan()) << (cell % WORD_BITS));
+        self.each_word(first, values, |word, valued| *word &= !valued);
+    }
+
+    /// Hands over each word that has cells from `first` on, and which of them hold a value.
+    fn each_word(&mut self, first: usize, values: &[f32], mut take: impl FnMut(&mut u64, u64)) {
+        let (mut cell, mut left) = (first, values);
+        while !left.is_empty() {
+            let place = cell % WORD_BITS;
+            let (own, others) = left.split_at(left.len().min(WORD_BITS - place));
+            let bits = own.iter().enumerate();
+            let valued = bits.fold(0, |word, (at, value)| {
+                word | u64::from(!value.is_nan()) << at
+            });
+            take(&mut self.words[cell / WORD_BITS], valued << place);
+            (cell, left) = (cell + own.len(), others);
         }
     }
 
@@ -219,5 +230,7 @@ mod tests {
         second.add_valued(500, &(500..1000).map(value).collect::<Vec<_>>());
         first.add(&second);
         assert_eq!(write_cells(&store, &product, first).await.unwrap(), key);
+        rest.add(&cells);
+        assert!(rest.has(597) && !rest.has(600) && rest == cells);
     }
 }

@@ -127,26 +127,26 @@ pub async fn load(store: &Store, id: &ManifestId) -> Result<Manifest, StorageErr
     }
 }
 
-/// Publishes a manifest whose objects are all durable.
+/// Publishes a manifest whose objects are all durable; its name, which takes longer to compute the more steps there are.
 ///
 /// # Errors
 /// `Conflict` if another writer took the number: read the newest one again and build on it.
-pub async fn commit(store: &Store, manifest: &Manifest) -> Result<(), StorageError> {
+pub async fn commit(store: &Store, manifest: &Manifest) -> Result<ManifestId, StorageError> {
     let key = ObjectKey::manifest(&manifest.product, manifest.number);
     if manifest.schema != MANIFEST_SCHEMA {
         let reason = format!("to write, it is of schema {}", manifest.schema);
         return Err(StorageError::damaged(key.as_str(), reason));
     }
     let Some((paged, pages)) = manifest.paged() else {
-        return document::put_new(store, &key, manifest)
-            .await
-            .map(|_new| ());
+        document::put_new(store, &key, manifest).await?;
+        return Ok(manifest.id());
     };
     // What the version before names is durable; all else is made so now, whoever may have had it once.
     let before = ObjectKey::manifest(&manifest.product, manifest.number.saturating_sub(1));
     let named_before: BTreeSet<ObjectKey> = page_keys(store, &before).await?.into_iter().collect();
     pages::write(store, &paged, pages, &named_before).await?;
-    document::put_new(store, &key, &paged).await.map(|_new| ())
+    document::put_new(store, &key, &paged).await?;
+    Ok(paged.id)
 }
 
 /// Keys of the pages that a stored manifest names; nothing if it has none, or is not there.

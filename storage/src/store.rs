@@ -11,6 +11,7 @@ mod clouds;
 mod create;
 #[cfg(test)]
 mod faulty;
+mod flushed;
 mod folder;
 mod hdfs;
 mod held_pages;

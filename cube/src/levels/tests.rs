@@ -34,6 +34,17 @@ async fn put(repository: &Repository, month: u32) {
     edit.commit("a step").await.unwrap();
 }
 
+/// Does the array of what levels were made of refer to the digests of the steps themselves?
+async fn shares_digests(repository: &Repository) -> bool {
+    let session = repository.session().await.unwrap();
+    let session = session.read().await;
+    let first = ChunkIndices(vec![0, 0]);
+    let [steps, levels] = ["values_sha256", "levels/steps_sha256"].map(|name| path(name).unwrap());
+    let steps = session.get_chunk_ref(&steps, &first).await.unwrap();
+    assert!(steps.is_some());
+    steps == session.get_chunk_ref(&levels, &first).await.unwrap()
+}
+
 #[test]
 fn levels_of_other_values_are_not_those_of_a_step() {
     let [own, other] = [b"a", b"b"].map(|bytes| Digest::of(bytes));
@@ -73,6 +84,7 @@ async fn levels_of_another_layout_are_not_read_and_made_anew() {
     let cube = repository.at(&At::Newest).await.unwrap();
     assert!(cube.range_of(0).is_some());
     assert!(cube.window_at(1, WINDOW, 0).await.unwrap().is_some());
+    assert!(shares_digests(&repository).await, "they are stored once");
     // Another program, which joins cells otherwise.
     let session = repository.session().await.unwrap();
     let mut session = session.write().await;
@@ -93,4 +105,7 @@ async fn levels_of_another_layout_are_not_read_and_made_anew() {
     let cube = repository.at(&At::Newest).await.unwrap();
     let found = cube.window_at(1, WINDOW, 1).await.unwrap().unwrap();
     assert_eq!(found.values[0].to_bits(), 282f32.to_bits());
+    // The first step has none.
+    assert!(cube.window_at(1, WINDOW, 0).await.unwrap().is_none());
+    assert!(!shares_digests(&repository).await);
 }

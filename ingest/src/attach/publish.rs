@@ -199,8 +199,8 @@ async fn next_version(
             notices: vec![],
         };
         match manifests::commit(store, &manifest).await {
-            Ok(()) => {
-                cube::keep_up(store, &manifest).await;
+            Ok(version) => {
+                cube::keep_up_as(store, &manifest, &version).await;
                 return Ok((manifest, true));
             }
             Err(StorageError::Conflict { .. }) => {

@@ -17,6 +17,12 @@ use crate::error::IngestError;
 /// Fields that are read at a time.
 pub(crate) const FIELDS_AT_ONCE: usize = 2;
 
+/// Fields of a file that was just read, and the cells that hold a value in some of them.
+pub(super) struct Valued<'a> {
+    pub(super) fields: BTreeSet<&'a ObjectKey>,
+    pub(super) cells: &'a Cells,
+}
+
 /// Writes the domain of steps that follow the newest version.
 ///
 /// What was dropped or revised may have held the only value of a cell: of such cells other steps are looked at until each was
@@ -27,6 +33,17 @@ pub(crate) async fn write(
     grid: &Grid,
     newest: Option<&Manifest>,
     steps: &[Step],
+) -> Result<ObjectKey, IngestError> {
+    write_knowing(store, product, grid, (newest, steps), &[]).await
+}
+
+/// The same for who knows of some files which cells they hold: their fields are not read.
+pub(super) async fn write_knowing(
+    store: &Store,
+    product: &ProductId,
+    grid: &Grid,
+    (newest, steps): (Option<&Manifest>, &[Step]),
+    known: &[Valued<'_>],
 ) -> Result<ObjectKey, IngestError> {
     let newest = newest.filter(|newest| newest.grid == *grid);
     let before = match newest {
@@ -64,7 +81,20 @@ pub(crate) async fn write(
         }) => lost.clone_from(&before),
         other => other?,
     }
-    let come = fields_but(steps, &own);
+    let mut come = fields_but(steps, &own);
+    for Valued {
+        fields,
+        cells: held,
+    } in known
+    {
+        // Of a file of which not all comes it is not known what does.
+        let own: BTreeSet<&ObjectKey> = come.iter().collect();
+        if held.map_count() == grid.cell_count() && fields.is_subset(&own) {
+            cells.add(held);
+            lost.remove(held);
+            come.retain(|field| !fields.contains(field));
+        }
+    }
     each(store, grid, come, |first, values| {
         cells.add_valued(first, values);
         lost.remove_valued(first, values);
@@ -252,6 +282,43 @@ mod tests {
         let found = found.unwrap();
         assert_eq!(found, anew, "it is that of a product that has no past");
         domain::read(store, &found).await.unwrap()
+    }
+
+    #[tokio::test]
+    async fn fields_of_which_the_cells_are_known_are_not_read_where_all_of_them_come() {
+        let (store, product) = (Store::memory(), "p".parse::<ProductId>().unwrap());
+        let before = [step(&store, 1, [1.0, NONE, NONE, NONE]).await];
+        let file = [
+            step(&store, 2, [NONE, 2.0, NONE, NONE]).await,
+            step(&store, 3, [NONE, NONE, 3.0, NONE]).await,
+        ];
+        let mut held = Cells::none(4);
+        held.add_valued(0, &[NONE, 2.0, 3.0, NONE]);
+        let known = [Valued {
+            fields: fields_of(&file),
+            cells: &held,
+        }];
+        let of = async |steps: &[Step]| {
+            let (counted, traffic) = store.counted();
+            let written = write_knowing(&counted, &product, &GRID, (None, steps), &known);
+            let domain = written.await.unwrap();
+            let anew = write(&store, &product, &GRID, None, steps).await;
+            assert_eq!(domain, anew.unwrap(), "it is that of who reads all");
+            (domain, traffic.counts().reads)
+        };
+        let [first, last] = &file;
+        let all = [before[0].clone(), first.clone(), last.clone()];
+        let (domain, reads_known) = of(&all).await;
+        let cells = domain::read(&store, &domain).await.unwrap();
+        assert_eq!(cells, [true, true, true, false]);
+        let (_, reads_alone) = of(&before).await;
+        assert_eq!(reads_known, reads_alone, "of the file nothing is read");
+        // Of a file whose last step is not taken, what its first one holds is looked up.
+        let part = [before[0].clone(), first.clone()];
+        let (domain, reads) = of(&part).await;
+        let cells = domain::read(&store, &domain).await.unwrap();
+        assert_eq!(cells, [true, true, false, false]);
+        assert!(reads > reads_alone);
     }
 
     #[test]

@@ -20,6 +20,7 @@ use storage::{StorageError, Store, manifests};
 use crate::error::IngestError;
 use crate::notice::{Answer, Versioned};
 use crate::put::StoredGranule;
+use extent::Valued;
 use merge::{Change, Merged};
 
 pub(crate) use extent::FIELDS_AT_ONCE;
@@ -65,9 +66,9 @@ async fn publish(store: &Store, granules: &[StoredGranule]) -> Result<Vec<Answer
             note(store, granules, &merged, &mut noted).await?;
             let manifest = build(store, newest.as_ref(), &merged, granules).await?;
             match manifests::commit(store, &manifest).await {
-                Ok(()) => {
-                    cube::keep_up(store, &manifest).await;
-                    Some(manifest.id())
+                Ok(version) => {
+                    cube::keep_up_as(store, &manifest, &version).await;
+                    Some(version)
                 }
                 Err(StorageError::Conflict { .. }) => {
                     race_lost(product, &mut pauses).await?;
@@ -109,7 +110,16 @@ async fn build(
     let last = &granules[merged.last_taken.unwrap_or(0)];
     let reading = &last.reading;
     let grid = newest.map_or(reading.grid, |m| m.grid);
-    let domain = extent::write(store, &last.product, &grid, newest, &merged.steps).await?;
+    let known = granules.iter().filter_map(|granule| {
+        let steps = granule.reading.steps.iter();
+        Some(Valued {
+            fields: steps.map(|step| &step.field).collect(),
+            cells: granule.valued.as_deref()?,
+        })
+    });
+    let known: Vec<Valued<'_>> = known.collect();
+    let steps = (newest, &merged.steps[..]);
+    let domain = extent::write_knowing(store, &last.product, &grid, steps, &known).await?;
     Ok(Manifest {
         schema: MANIFEST_SCHEMA,
         product: last.product.clone(),

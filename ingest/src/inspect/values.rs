@@ -12,6 +12,14 @@ pub(crate) enum Values {
 }
 
 impl Values {
+    /// Says that a part of a variable will be read next but for what was asked for before: a process reads it meanwhile.
+    pub(crate) async fn ask(&mut self, variable: &str, part: &[Part]) -> Result<(), Stop> {
+        match self {
+            Self::Process(session) => session.ask(variable, part).await,
+            Self::Arrays(_) => Ok(()),
+        }
+    }
+
     /// Values of a part of a variable, as many as `expected`, as float64.
     pub(crate) async fn read(
         &mut self,

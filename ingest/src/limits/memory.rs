@@ -53,7 +53,7 @@ pub(crate) fn of_grids(planned: &PlannedGranule, limits: &Limits) -> u64 {
     let map = map.saturating_mul(grids_at_once(plan, limits) as u64);
     let reading = map.saturating_add(plan.values.library_bytes());
     let raw = raw.size_bytes.min(fetch::HELD_BYTES);
-    reading.max(raw.saturating_mul(RAW_COPIES))
+    reading.saturating_add(raw.saturating_mul(RAW_COPIES))
 }
 
 /// What is held of a map that is worked on.

@@ -15,13 +15,14 @@ use contract::product::ProductId;
 use contract::quantity::Quantity;
 use contract::time::Period;
 use futures::stream::{FuturesOrdered, StreamExt as _};
+use storage::domain::Cells;
 use tokio::sync::mpsc;
 
 use super::Pipeline;
 use super::metrics::{Metrics, ended};
 use super::progress::Stage;
 use crate::check::Found;
-use crate::decode::DecodedBand;
+use crate::decode::{Conversion, RawBand};
 use crate::encode::{EncodedGrid, Encoding};
 use crate::error::{IngestError, Rejection, Stop};
 use crate::fetch::RawGranule;
@@ -31,13 +32,13 @@ use crate::put::reading::Reading;
 use crate::{decode, put};
 
 impl Pipeline<'_> {
-    /// All steps of a file that hold a value, and what was masked in all of its steps.
+    /// All steps of a file that hold a value, and what was found in all of its steps.
     pub(crate) async fn grids(
         &self,
         shown: &Path,
         planned: PlannedGranule,
         newest: Option<&Manifest>,
-    ) -> Result<(Reading, MaskedCells), Stop> {
+    ) -> Result<(Reading, FoundInAll), Stop> {
         let PlannedGranule { raw, mut plan } = planned;
         let limits = &self.settings.limits;
         let at_once = memory::grids_at_once(&plan, limits);
@@ -50,6 +51,7 @@ impl Pipeline<'_> {
             grid: plan.mapping.grid,
             bands: bands(&plan.mapping.grid, limits.band_cells).collect(),
             variable: plan.variable.name.clone(),
+            conversion: Conversion::of(&plan),
             raw: raw.clone(),
             newest,
         };
@@ -57,6 +59,7 @@ impl Pipeline<'_> {
             mut steps,
             masked,
             range,
+            valued,
         } = grids.all(&mut plan, at_once).await?;
         raw.check_unchanged()?;
         if steps.is_empty() {
@@ -78,8 +81,16 @@ impl Pipeline<'_> {
         }
         let mut reading = Reading::new(recipe, &target, mapping.grid, steps);
         reading.assumptions = assumptions;
-        Ok((reading, masked))
+        Ok((reading, FoundInAll { masked, valued }))
     }
+}
+
+/// What was found in all steps of a file.
+#[derive(Debug, Default)]
+pub(crate) struct FoundInAll {
+    pub(crate) masked: MaskedCells,
+    /// Cells that hold a value in some step; none of maps that are not held whole.
+    pub(crate) valued: Option<Cells>,
 }
 
 /// What the steps of a file have in common.
@@ -94,6 +105,7 @@ struct Grids<'a> {
     /// Rows of the grid that are worked on together, from the north.
     bands: Vec<Range<u32>>,
     variable: String,
+    conversion: Conversion,
     raw: RawGranule,
     newest: Option<&'a Manifest>,
 }
@@ -114,18 +126,23 @@ impl Grids<'_> {
                 }
             }
             let step = plan.steps[index];
+            let later = plan.steps.get(index + 1).copied();
             progress.stage(self.shown, Stage::Decode, index + 1, self.count);
             // One band is worked on while the next is read, and no further one is asked for.
             let (given, taken) = mpsc::channel(1);
             stored.push_back(self.grid(index, step.period, taken));
-            for rows in &self.bands {
+            for (band, rows) in self.bands.iter().enumerate() {
+                let next = match (self.bands.get(band + 1), later, self.bands.first()) {
+                    (Some(rows), ..) => Some((step, rows.clone())),
+                    (None, Some(later), Some(rows)) => Some((later, rows.clone())),
+                    _ => None,
+                };
                 let mut decoding = pin!(async {
                     let Ok(room) = given.reserve().await else {
                         return Ok(None);
                     };
-                    let decoded = decode::run(plan, step, rows.clone());
-                    let decoded = metrics.timed("decode", decoded).await?;
-                    room.send(decoded);
+                    let read = decode::read(plan, (step, rows.clone()), next);
+                    room.send(metrics.timed("decode", read).await?);
                     Ok::<_, Stop>(Some(()))
                 });
                 let is_taken = loop {
@@ -146,14 +163,13 @@ impl Grids<'_> {
         Ok(all)
     }
 
-    /// One time step whose bands are decoded, with the range of its values: check, encode, put; and what was masked in it. None if
-    /// it holds no value at all.
+    /// One time step whose bands are read: check, encode, put.
     async fn grid(
         &self,
         index: usize,
         period: Period,
-        mut decoded: mpsc::Receiver<DecodedBand>,
-    ) -> Result<(Option<(Step, [f64; 2])>, MaskedCells), Stop> {
+        mut read: mpsc::Receiver<RawBand>,
+    ) -> Result<One, Stop> {
         let Pipeline {
             store,
             progress,
@@ -166,53 +182,83 @@ impl Grids<'_> {
             quantity: self.quantity,
             product: self.product.clone(),
             variable: self.variable.clone(),
+            conversion: self.conversion.clone(),
             spool: settings.spool.clone(),
             metrics: self.pipeline.metrics.clone(),
             found: Found::nothing(),
+            valued: (self.bands.len() == 1).then(|| Cells::none(self.grid.cell_count())),
             rows_done: 0,
             encoding: None,
         };
-        while let Some(band) = decoded.recv().await {
+        while let Some(band) = read.recv().await {
             if work.rows_done == 0 {
                 progress.stage(self.shown, Stage::Check, index + 1, self.count);
             }
             work = tokio::task::spawn_blocking(move || work.band(band)).await??;
         }
-        let found = work.found;
+        let (found, valued) = (work.found, work.valued.take());
+        let one = One {
+            step: None,
+            range: found.range(),
+            masked: found.masked,
+            valued,
+        };
         let encoded = tokio::task::spawn_blocking(move || work.finish()).await??;
         let Some(encoded) = encoded else {
-            return Ok((None, found.masked));
+            return Ok(one);
         };
         progress.stage(self.shown, Stage::Put, index + 1, self.count);
         let there = self.newest.and_then(|newest| field_of(newest, period));
         let put = async { Ok(put::run(store, encoded, &self.raw, &self.grid, there).await?) };
         let stored = self.pipeline.metrics.timed("put", put).await?;
-        Ok((Some((stored, found.range())), found.masked))
+        Ok(One {
+            step: Some(stored),
+            ..one
+        })
     }
 }
 
-/// One step of which bands are checked and encoded, on a thread that may take its time.
+/// A step that is done.
+struct One {
+    /// None if it holds no value at all.
+    step: Option<Step>,
+    /// Lowest and highest value; of none at all nothing to be used.
+    range: [f64; 2],
+    masked: MaskedCells,
+    /// Cells that hold a value; none of maps that are not held whole.
+    valued: Option<Cells>,
+}
+
+/// One step of which bands are turned, checked and encoded, on a thread that may take its time.
 struct Work {
     grid: Grid,
     period: Period,
     quantity: Quantity,
     product: ProductId,
     variable: String,
+    conversion: Conversion,
     spool: PathBuf,
     metrics: Metrics,
     found: Found,
+    /// Cells that hold a value, where that is asked.
+    valued: Option<Cells>,
     rows_done: u32,
     /// From the first band on that holds a value.
     encoding: Option<Encoding>,
 }
 
 impl Work {
-    fn band(mut self, band: DecodedBand) -> Result<Self, Stop> {
-        let rows = (band.values.len() / (self.grid.cols as usize).max(1)) as u32;
+    fn band(mut self, band: RawBand) -> Result<Self, Stop> {
+        let running = self.metrics.start("check");
+        let band = self.conversion.band(band);
+        let cols = (self.grid.cols as usize).max(1);
+        let rows = (band.values.len() / cols) as u32;
         let empty_rows = self.rows_done;
         self.rows_done += rows;
-        let running = self.metrics.start("check");
         let checked = self.found.band(band, self.quantity);
+        if let Some(valued) = &mut self.valued {
+            valued.add_valued(empty_rows as usize * cols, &checked.0);
+        }
         // A file that is refused has nothing encoded after its last band.
         let whole = if self.rows_done == self.grid.rows {
             let found = self.found.check(self.quantity, &self.variable, self.period);
@@ -266,16 +312,22 @@ struct Stored {
     masked: MaskedCells,
     /// Of the values of all steps, least and greatest.
     range: Option<[f64; 2]>,
+    /// Cells that hold a value in some step.
+    valued: Option<Cells>,
 }
 
 impl Stored {
-    fn take(&mut self, (step, masked): (Option<(Step, [f64; 2])>, MaskedCells)) {
-        if let Some((step, [low, high])) = step {
+    fn take(&mut self, one: One) {
+        if let Some(step) = one.step {
             self.steps.push(step);
-            let own = self.range;
+            let (own, [low, high]) = (self.range, one.range);
             self.range = Some(own.map_or([low, high], |[l, h]| [l.min(low), h.max(high)]));
         }
-        self.masked = self.masked + masked;
+        self.masked = self.masked + one.masked;
+        match (&mut self.valued, one.valued) {
+            (Some(all), Some(own)) => all.add(&own),
+            (none, own) => *none = own,
+        }
     }
 }
 

@@ -23,6 +23,7 @@ use crate::limits::gates::{Gates, Seat};
 use crate::limits::memory;
 use crate::notice::{Answer, Order, PendingNotice, Versioned};
 use crate::observation::{self, ObservationSink};
+use crate::pipeline::grids::FoundInAll;
 use crate::plan::{self, PlannedGranule, Wish};
 use crate::put::{self, StoredGranule};
 use crate::settings::Settings;
@@ -164,16 +165,22 @@ impl Pipeline<'_> {
         let unchanged = newest
             .as_ref()
             .and_then(|newest| unchanged(newest, &planned, wish, way.notice.place));
-        // Also of a file that is there: what is stored of it is compared, and replaced if it is damaged.
-        put::raw(self.store, &product, &planned.raw).await?;
+        let raw = planned.raw.clone();
+        let raw = put::raw(self.store, &product, &raw);
         if let Some(unchanged) = unchanged {
+            // What is stored of it is compared, and replaced if it is damaged.
+            raw.await?;
             let answer = commit::answer_unchanged(self.store, way.notice, unchanged, None);
             return Ok(Prepared::Answered(answer.await?));
         }
         let _pass = seat
             .with_memory(memory::of_grids(&planned, &self.settings.limits))
             .await;
-        let (reading, masked) = self.grids(way.shown, planned, newest.as_ref()).await?;
+        // Whatever becomes of its values, the file is stored whole, beside them.
+        let values = self.grids(way.shown, planned, newest.as_ref());
+        let (stored, values) = tokio::join!(raw, values);
+        stored?;
+        let (reading, FoundInAll { masked, valued }) = values?;
         match reading.put(self.store, &product).await {
             // A program that reads otherwise under the same version noted it: the file lands all the same.
             Err(error @ StorageError::Conflict { .. }) => {
@@ -186,6 +193,7 @@ impl Pipeline<'_> {
             product,
             reading,
             masked,
+            valued: valued.map(Arc::new),
         }))
     }
 

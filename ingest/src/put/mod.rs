@@ -10,6 +10,7 @@ use contract::key::ObjectKey;
 use contract::manifest::Step;
 use contract::masked::MaskedCells;
 use contract::product::ProductId;
+use storage::domain::Cells;
 use storage::{Store, fields};
 
 use crate::encode::EncodedGrid;
@@ -27,6 +28,8 @@ pub(crate) struct StoredGranule {
     pub(crate) reading: Reading,
     /// What was masked in all steps of the file: those without any value are in no manifest.
     pub(crate) masked: MaskedCells,
+    /// Cells that hold a value in some step of it, where that is known: its fields need not be read again for that.
+    pub(crate) valued: Option<Arc<Cells>>,
 }
 
 /// Stores the file as it came.

@@ -118,8 +118,11 @@ impl Group {
 
     fn push(&mut self, window: &Window, band: &Grid, values: &[f32]) {
         self.chunk.clear();
-        let cells = window.cell_indices(band);
-        self.chunk.extend(cells.map(|i| no_data_alike(values[i])));
+        let [cols, width] = [band.cols as usize, window.cols as usize];
+        for row in window.row..window.row + window.rows {
+            let own = &values[row as usize * cols + window.col as usize..][..width];
+            self.chunk.extend(own.iter().map(|v| no_data_alike(*v)));
+        }
         self.lists.values().append_slice(&self.chunk);
         self.lists.append(true);
         let number = self.first + self.len() as u32;

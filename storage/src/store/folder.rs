@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use contract::key::ObjectKey;
 
+use super::flushed;
 use crate::content::{Content, PIECE_BYTES};
 
 /// How often a folder may vanish under a writer: a removal takes emptied folders along.
@@ -39,7 +40,7 @@ pub(super) async fn replace(
 pub(super) fn replace_now(root: &Path, path: &Path, content: &[u8]) -> io::Result<()> {
     let fill = |file: &mut File| file.write_all(content);
     write(path, fill, |from, to| fs::rename(from, to))?;
-    flush_folders(root, path)
+    flushed::flush(root, path)
 }
 
 /// How a file that is written gets its name.
@@ -64,7 +65,7 @@ async fn put(
             || matches!(&written, Err(e) if e.kind() == ErrorKind::AlreadyExists)
         {
             // Another writer may have made the name and not yet flushed it.
-            flush_folders(&root, &path)?;
+            flushed::flush(&root, &path)?;
         }
         written
     });
@@ -126,15 +127,6 @@ fn stage(path: &Path) -> io::Result<(File, PathBuf)> {
 pub(super) fn is_half_written(name: &str) -> bool {
     name.rsplit_once('#')
         .is_some_and(|(_, digits)| !digits.is_empty() && digits.bytes().all(|b| b.is_ascii_digit()))
-}
-
-/// Flushes the folders of an object, up to the root of the store.
-fn flush_folders(root: &Path, path: &Path) -> io::Result<()> {
-    let inside = |folder: &&Path| folder.starts_with(root);
-    for folder in path.ancestors().skip(1).take_while(inside) {
-        File::open(folder)?.sync_all()?;
-    }
-    Ok(())
 }
 
 pub(super) fn failed(key: &ObjectKey, source: io::Error) -> object_store::Error {

@@ -155,11 +155,12 @@ pub(crate) async fn two_writers_race_for_one_manifest_number(store: &Store) {
             manifests::commit(store, &mine),
             manifests::commit(store, &yours)
         );
-        let winner = match both {
-            (Ok(()), Err(StorageError::Conflict { .. })) => mine,
-            (Err(StorageError::Conflict { .. }), Ok(())) => yours,
+        let (name, winner) = match both {
+            (Ok(name), Err(StorageError::Conflict { .. })) => (name, mine),
+            (Err(StorageError::Conflict { .. }), Ok(name)) => (name, yours),
             other => panic!("number {number}: {other:?}"),
         };
+        assert_eq!(name, winner.id());
         let latest = manifests::latest(store, &product).await.unwrap();
         assert_eq!(latest.as_ref(), Some(&winner));
         assert_eq!(manifests::load(store, &winner.id()).await.unwrap(), winner);

@@ -62,6 +62,7 @@ fn noticed(content: &str, periods: &[Period], second: u32) -> StoredGranule {
         reading: Reading::new(Recipe::of(Wish::default()), &target, GRID, steps),
         product,
         masked: MaskedCells::default(),
+        valued: None,
     }
 }
 

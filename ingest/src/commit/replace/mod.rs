@@ -48,8 +48,8 @@ pub(crate) async fn replace(
         (next.domain, next.series) = (domain.await?, vec![]);
         (next.schema, next.number) = (MANIFEST_SCHEMA, newest.number + 1);
         match manifests::commit(store, &next).await {
-            Ok(()) => {
-                cube::keep_up(store, &next).await;
+            Ok(version) => {
+                cube::keep_up_as(store, &next, &version).await;
                 return Ok(Some(next));
             }
             Err(StorageError::Conflict { .. }) => race_lost(product, &mut pauses).await?,

@@ -20,11 +20,20 @@ pub(super) enum Opened {
     Rejected(Rejection),
 }
 
-/// What the parent asks for.
-#[derive(Debug, Serialize, Deserialize)]
+/// What the parent asks for. It may ask for more before it reads an answer; answers come in the order of requests.
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Request {
     pub(super) variable: String,
     pub(super) part: Vec<Part>,
+}
+
+impl Request {
+    pub(super) fn new(variable: &str, part: &[Part]) -> Self {
+        Self {
+            variable: variable.to_owned(),
+            part: part.to_vec(),
+        }
+    }
 }
 
 /// What the reader says to a request; after `Values` follow that many little-endian float64.

@@ -1,5 +1,6 @@
 //! The parent's side of one reader process: starts it, asks it, and turns its death into a refusal of the file.
 
+use std::collections::VecDeque;
 use std::path::Path;
 use std::process::Stdio;
 
@@ -28,6 +29,8 @@ pub(crate) struct Session {
     limits: Limits,
     deadline: Instant,
     library_bytes: u64,
+    /// What it was asked for and has not been read, in its order.
+    asked: VecDeque<Request>,
 }
 
 /// What became of waiting for the reader.
@@ -73,6 +76,7 @@ impl Session {
             limits,
             deadline: Instant::now() + limits.wall,
             library_bytes: 0,
+            asked: VecDeque::new(),
         };
         match session.message::<Opened>().await? {
             Opened::Described(description) => {
@@ -102,13 +106,16 @@ impl Session {
             );
             return Err(Rejection::new(RejectReason::TooLarge, variable, detail).into());
         }
-        let request = Request {
-            variable: variable.to_owned(),
-            part: part.to_vec(),
-        };
-        let bytes = protocol::encode(&request).map_err(|source| IngestError::Pipe { source })?;
-        if self.input.write_all(&bytes).await.is_err() {
-            return Err(self.post_mortem(Silence::Ended).await);
+        let request = Request::new(variable, part);
+        // What was asked for and is not wanted any more comes before.
+        while self.asked.front().is_some_and(|front| *front != request) {
+            self.asked.pop_front();
+            if let Answer::Values { count } = self.message().await? {
+                self.pass_over(count).await?;
+            }
+        }
+        if self.asked.pop_front().is_none() {
+            self.send(&request).await?;
         }
         match self.message::<Answer>().await? {
             Answer::Values { count } if count == expected => self.values(count as usize).await,
@@ -120,6 +127,37 @@ impl Session {
             }
             Answer::Rejected(rejection) => Err(rejection.cleaned().into()),
         }
+    }
+
+    /// Asks for a part of a variable that will be read after what was asked for before: the reader is at it while its parent is
+    /// busy with something else. Nothing is asked for twice.
+    pub(crate) async fn ask(&mut self, variable: &str, part: &[Part]) -> Result<(), Stop> {
+        let request = Request::new(variable, part);
+        if self.asked.contains(&request) {
+            return Ok(());
+        }
+        self.send(&request).await?;
+        self.asked.push_back(request);
+        Ok(())
+    }
+
+    async fn send(&mut self, request: &Request) -> Result<(), Stop> {
+        let bytes = protocol::encode(request).map_err(|source| IngestError::Pipe { source })?;
+        if self.input.write_all(&bytes).await.is_err() {
+            return Err(self.post_mortem(Silence::Ended).await);
+        }
+        Ok(())
+    }
+
+    /// Reads values that nobody wants.
+    async fn pass_over(&mut self, count: u64) -> Result<(), Stop> {
+        let mut left = count;
+        while left > 0 {
+            let block = left.min(BLOCK_VALUES as u64);
+            self.bytes(block as usize * 8).await?;
+            left -= block;
+        }
+        Ok(())
     }
 
     /// Values block by block: as bytes and as numbers at the same time a map would take its place twice.
