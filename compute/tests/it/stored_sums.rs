@@ -261,7 +261,7 @@ async fn what_lies_inside_is_not_read() {
         )
         .await;
         match (of_values, of_sums) {
-            (Err(error), Ok(found)) if error.contains("series/carbon_flux") => {
+            (Err(error), Ok(found)) if error.contains("along_time/carbon_flux") => {
                 assert!(error.contains(key.as_str()), "{error}");
                 assert!(found == right);
                 damaged += 1;

@@ -149,8 +149,19 @@ async fn frozen_sums_are_those_of_their_values() {
     let sums = frozen(MANIFEST_SCHEMA).with_file_name("sums");
     let (_folder, store) = copy_of(&sums);
     let manifest = Arc::new(summed_version(grid).await);
-    let values = Values::of(&store, &manifest).await.unwrap();
     let steps = 0..SUMMED_STEPS;
+    // Its copy along time has the order of before: nobody reads it, and it is made anew.
+    let before = Values::of(&store, &manifest).await.unwrap();
+    assert!(before.time_major().is_empty() && before.summed_as(&steps).is_none());
+    assert_eq!(compact(&store, "cubes/p").await.unwrap(), 1);
+    let values = Values::of(&store, &manifest).await.unwrap();
+    assert_eq!(values.time_major(), std::slice::from_ref(&steps));
+    let cell = values.cell(3, 5).await.unwrap();
+    let own: Vec<f32> = steps
+        .clone()
+        .map(|step| flux(step, (3 * SUMMED[1] + 5) as usize))
+        .collect();
+    assert_eq!(bits(&cell), bits(&own));
     let basis = values.summed_as(&steps).unwrap();
     assert_eq!(basis.row_weights.len(), SUMMED[0] as usize);
     let blocks = [[0, 0], [0, 1], [1, 0], [1, 1]];

@@ -263,7 +263,7 @@ async fn a_damaged_run_is_an_error_that_names_it_and_is_made_again() {
                 assert_eq!(bits(&blocks[0].values[..RUN]), bits(&own));
             }
             Err(error @ CubeError::Chunk { .. }) => {
-                assert!(error.to_string().contains("series/carbon_flux"), "{error}");
+                assert!(error.to_string().contains("along_time/carbon_flux"), "{error}");
                 refused += 1;
             }
             Err(error) => panic!("{error}"),
@@ -276,7 +276,7 @@ async fn a_damaged_run_is_an_error_that_names_it_and_is_made_again() {
     let checked = verify::check(&store, &product, &damaged).await.unwrap();
     let place = &checked.places[&key];
     assert!(
-        place.contains("of series/carbon_flux in the newest state"),
+        place.contains("of along_time/carbon_flux in the newest state"),
         "{place}"
     );
     assert_eq!(checked.findings, []);
