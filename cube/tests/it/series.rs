@@ -263,7 +263,10 @@ async fn a_damaged_run_is_an_error_that_names_it_and_is_made_again() {
                 assert_eq!(bits(&blocks[0].values[..RUN]), bits(&own));
             }
             Err(error @ CubeError::Chunk { .. }) => {
-                assert!(error.to_string().contains("along_time/carbon_flux"), "{error}");
+                assert!(
+                    error.to_string().contains("along_time/carbon_flux"),
+                    "{error}"
+                );
                 refused += 1;
             }
             Err(error) => panic!("{error}"),
