@@ -12,6 +12,7 @@ pub mod extremes;
 pub mod harmonics;
 mod hovmoller;
 pub mod least_squares;
+pub mod line;
 pub mod linear_trend;
 pub mod mann_kendall;
 pub mod mean_difference;

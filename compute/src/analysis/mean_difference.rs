@@ -4,6 +4,7 @@ use contract::time::Period;
 
 use super::autocorrelation::{autocorrelation, effective_count};
 use super::distribution::student_two_sided;
+use super::line::with_holes;
 
 /// Mean of a series over time, and what is known of its error.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -29,7 +30,8 @@ pub fn mean_over_time(periods: &[Period], values: &[f64], about: &[f64]) -> Mean
     }
     let present: Vec<f64> = about.iter().copied().filter(|v| !v.is_nan()).collect();
     let spread = super::climatology::spread(&present);
-    let effective = spread.map(|_| effective_count(count, autocorrelation(about, 1)));
+    let next = || autocorrelation(&with_holes(periods, about), 1);
+    let effective = spread.map(|_| effective_count(count, next()));
     MeanOverTime {
         count,
         mean: (count > 0).then(|| sum / seconds),
@@ -75,6 +77,18 @@ mod tests {
             mean_over_time(&year, &[f64::NAN; 12], &[f64::NAN; 12]).mean,
             None
         );
+    }
+
+    /// By hand: 1, 1, _, 2, 2 about 1.5 has two pairs of 0.25, of four of five steps: 4/5 of the variance. Side by side it would
+    /// have a third pair of -0.25.
+    #[test]
+    fn a_value_after_a_gap_is_not_the_next_one() {
+        let year = months(12);
+        let periods = [year[0], year[1], year[3], year[4]];
+        let values = [1.0, 1.0, 2.0, 2.0];
+        let found = mean_over_time(&periods, &values, &values);
+        let expected = 4.0 * (1.0 - 0.8) / (1.0 + 0.8);
+        assert!((found.effective_count.unwrap() - expected).abs() < 1e-12);
     }
 
     /// What `scipy.stats.ttest_ind(equal_var=False)` prints of the same values, alternating so that none is worth less than one:

@@ -2,6 +2,8 @@
 
 use contract::time::{Period, TimeStep};
 
+use super::line::Line;
+
 /// Milliseconds in a Julian year of 365.25 days.
 pub const YEAR_MS: f64 = 365.25 * 86_400_000.0;
 /// Share of a bin's time that must hold data for its mean to count.
@@ -14,7 +16,8 @@ pub fn middles_years(periods: &[Period]) -> Vec<f64> {
     periods.iter().map(years).collect()
 }
 
-/// Means of steps over bins of the calendar: see [`Bins::means`]; steps as they are for `Native`.
+/// Means of steps over bins of the calendar: see [`Bins::means`]; steps as they are for `Native`, with NaN for those that are
+/// missing between them ([`Line`]).
 ///
 /// `periods` are in the order of time and do not overlap; `values` are beside them, NaN no data, any unit.
 pub fn means_over(periods: &[Period], values: &[f64], step: TimeStep) -> (Vec<Period>, Vec<f64>) {
@@ -27,20 +30,31 @@ pub fn means_over(periods: &[Period], values: &[f64], step: TimeStep) -> (Vec<Pe
 #[derive(Debug)]
 pub struct Bins {
     bins: Vec<Period>,
-    /// Of each bin the first step that reaches into it, and how many seconds of that and of each one after it lie in it; none
-    /// where steps are taken as they are.
-    inside: Option<Vec<(usize, Vec<f64>)>>,
+    steps: Steps,
+}
+
+#[derive(Debug)]
+enum Steps {
+    /// Steps are taken as they are.
+    Native(Line),
+    /// Of each bin the first step that reaches into it, and how many seconds of that and of each one after it lie in it.
+    Inside(Vec<(usize, Vec<f64>)>),
 }
 
 impl Bins {
-    /// Bins without a gap from the first step to the last; the steps themselves for `Native`.
+    /// Bins without a gap from the first step to the last; for `Native` the steps themselves, and those that are missing where
+    /// they lie on a line ([`Line::of`]).
     ///
     /// `periods` are in the order of time and do not overlap.
     pub fn over(periods: &[Period], step: TimeStep) -> Self {
-        let bins = bins_over(periods, step);
         if step == TimeStep::Native {
-            return Self { bins, inside: None };
+            let line = Line::of(periods).unwrap_or_else(|| Line::as_they_are(periods));
+            return Self {
+                bins: line.steps.clone(),
+                steps: Steps::Native(line),
+            };
         }
+        let bins = bins_over(periods, step);
         let mut inside = Vec::with_capacity(bins.len());
         let mut from = 0;
         for bin in &bins {
@@ -55,8 +69,8 @@ impl Bins {
             });
             inside.push((from, shared_s.collect()));
         }
-        let inside = Some(inside);
-        Self { bins, inside }
+        let steps = Steps::Inside(inside);
+        Self { bins, steps }
     }
 
     /// The bins.
@@ -67,8 +81,9 @@ impl Bins {
     /// Means over the bins, NaN where less than half of a bin's time holds data: each step counts by the time of it that lies
     /// in the bin. `values` are one for each step, NaN no data, any unit.
     pub fn means(&self, values: &[f64]) -> Vec<f64> {
-        let Some(inside) = &self.inside else {
-            return values.to_vec();
+        let inside = match &self.steps {
+            Steps::Native(line) => return line.spread(values),
+            Steps::Inside(inside) => inside,
         };
         let mean = |(bin, (from, shared_s)): (&Period, &(usize, Vec<f64>))| {
             let (mut sum, mut with_data_s) = (0.0, 0.0);

@@ -10,6 +10,7 @@ use futures::future::BoxFuture;
 
 use super::climatology::deseasonalised;
 use super::correlation::correlations;
+use super::line::{Line, with_holes};
 use super::mean_difference::{MeanOverTime, mean_over_time, welch};
 use super::read::{self, ReadSeries, Version};
 use super::timeline::{bins_over, longest_s, means_over, no_shorter};
@@ -21,7 +22,7 @@ const SEASONS_FROM_MONTHS: usize = 24;
 /// The correlation of two products over a region or at a place.
 ///
 /// # Errors
-/// Those of reading either; nothing that both cover; steps that have no common ones.
+/// Those of reading either; nothing that both cover; steps that have no common ones; lags between steps at unequal distances.
 pub fn correlation<'a>(
     engine: &'a Engine,
     first: Version<'a>,
@@ -34,6 +35,11 @@ pub fn correlation<'a>(
         let a = read::series(engine, first, &query.series, all).await?;
         let b = read::series(engine, second, &other, all).await?;
         let (bins, mut values) = on_common_bins(&a, &b, query.step)?;
+        if query.max_lag > 0 && Line::of(&bins).is_none() {
+            let reason = "gaps lie between the steps of both, whose lengths or distances are unequal: ask for lag 0, or for \
+                          steps of the calendar";
+            return Err(ContractError::invalid("lag", &query.max_lag.to_string(), reason).into());
+        }
         if query.deseasonalise {
             let step_s = longest_s(&bins);
             if step_s > CalendarBins::Month.longest_step_s() {
@@ -42,6 +48,8 @@ pub fn correlation<'a>(
             }
             values = values.map(|values| deseasonalised(&bins, &values));
         }
+        // Steps that both lack; all are there where they lie on a line.
+        values = values.map(|values| with_holes(&bins, &values));
         let rows = correlations(&values[0], &values[1], query.max_lag);
         let strongest = rows
             .iter()
@@ -73,7 +81,8 @@ pub fn correlation<'a>(
     })
 }
 
-/// Two series on the bins that both cover, at least one.
+/// Two series on the bins that both cover, at least one. Native steps that one has, or that both lack, stay in their places
+/// between those of both, NaN where a series lacks them; those of both alone where steps lie on no line.
 fn on_common_bins(
     a: &ReadSeries,
     b: &ReadSeries,
@@ -100,16 +109,35 @@ fn on_common_bins(
         let reason = format!("no step is common to both: {}, {}", covers(a), covers(b));
         return Err(ContractError::invalid("step", step.as_str(), reason));
     }
-    let on_common = |series: &ReadSeries| -> Vec<f64> {
-        let (bins, means) = means_over(&series.periods, &series.values, step);
+    let bins = match step {
+        TimeStep::Native => on_line(&bins_a, &bins_b, common),
+        _ => common,
+    };
+    let on_bins = |series: &ReadSeries| -> Vec<f64> {
+        let (own, means) = means_over(&series.periods, &series.values, step);
         let at = |bin: &Period| {
-            bins.binary_search(bin)
+            own.binary_search(bin)
                 .map_or(f64::NAN, |index| means[index])
         };
-        common.iter().map(at).collect()
+        bins.iter().map(at).collect()
     };
-    let values = [on_common(a), on_common(b)];
-    Ok((common, values))
+    let values = [on_bins(a), on_bins(b)];
+    Ok((bins, values))
+}
+
+/// All steps from the first of those that two series have in common to the last, of either and of none; `common` where they
+/// lie on no line.
+fn on_line(a: &[Period], b: &[Period], common: Vec<Period>) -> Vec<Period> {
+    let (Some(first), Some(last)) = (common.first(), common.last()) else {
+        return common;
+    };
+    let is_between = |step: &&Period| *first <= **step && **step <= *last;
+    let both = a.iter().chain(b).filter(is_between);
+    let mut steps: Vec<Period> = both.copied().collect();
+    steps.sort_unstable();
+    steps.dedup();
+    let line = Line::of(&steps).or_else(|| Line::of(&common));
+    line.map_or(common, |line| line.steps)
 }
 
 /// The mean over time of one version of a product less that of another version, product or period.

@@ -214,6 +214,56 @@ async fn a_product_that_follows_another_is_found_at_its_lag() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn a_month_that_is_missing_keeps_its_place_in_a_correlation_of_native_steps() {
+    let (_folder, store) = folder_store();
+    let noise = |month: u32| (month.wrapping_mul(2_654_435_761) >> 20) as f32 / 409.6;
+    let without = |mut steps: Vec<(Period, Vec<f32>)>, missing: &[usize]| {
+        for at in missing.iter().rev() {
+            steps.remove(*at);
+        }
+        steps
+    };
+    let (first, second) = (
+        months(60, |month, _| noise(month + 2)),
+        months(66, |month, _| noise(month)),
+    );
+    let a = wind(&store, "first", &without(first, &[20, 33])).await;
+    let b = wind(&store, "second", &without(second.clone(), &[20, 33, 40])).await;
+    let engine = Engine::in_process(store.clone(), parts(2));
+    let mut query = CorrelationQuery::new(region("first", "global"), product("second"), 4).unwrap();
+    query.step = TimeStep::Native;
+    let (a_id, b_id) = (a.id(), b.id());
+    let found = analysis::correlation(&engine, (&a, &a_id), (&b, &b_id), &query);
+    let found = found.await.unwrap();
+    assert_eq!(found.strongest_lag_steps, Some(2));
+    let row = &found.rows[6];
+    assert!((row.correlation.unwrap() - 1.0).abs() < 1e-9, "{row:?}");
+    // 58 pairs, less months 20 and 33 of the first, 20, 33 and 40 of the second.
+    assert_eq!((row.count, found.rows[4].count), (53, 57));
+    assert_eq!(found.end.to_string(), "2006-01-01T00:00:00Z");
+
+    // The first half of each month: steps between which nothing is as long as they are.
+    let half = |(period, cells): &(Period, Vec<f32>)| {
+        let end = period.start.to_string().replace("-01T", "-16T");
+        let half = Period::new(period.start, end.parse().unwrap()).unwrap();
+        (half, cells.clone())
+    };
+    let halves: Vec<_> = second.iter().map(half).collect();
+    let c = wind(&store, "halves", &halves).await;
+    let d = wind(&store, "fewer", &without(halves, &[20])).await;
+    let (c_id, d_id) = (c.id(), d.id());
+    query.series = region("halves", "global");
+    query.with = product("fewer");
+    let refused = analysis::correlation(&engine, (&c, &c_id), (&d, &d_id), &query).await;
+    let refused = refused.unwrap_err();
+    assert_eq!(refused.class(), ErrorClass::BadRequest);
+    assert!(refused.to_string().contains("ask for lag 0"), "{refused}");
+    query.max_lag = 0;
+    let found = analysis::correlation(&engine, (&c, &c_id), (&d, &d_id), &query);
+    assert_eq!(found.await.unwrap().rows[0].count, 65);
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn periods_versions_and_products_are_compared() {
     let (_folder, store) = folder_store();
     // A season, a little noise, and 0.15 more from 2006 on.

@@ -19,7 +19,7 @@ pub struct CorrelationQuery {
     pub series: SeriesQuery,
     /// The second.
     pub with: ProductId,
-    /// What they are compared in; `native` needs the same periods of both.
+    /// What they are compared in; `native` needs the same periods of both, and lags need them at equal distances.
     pub step: TimeStep,
     /// Is the mean of each calendar month taken off both first?
     pub deseasonalise: bool,
