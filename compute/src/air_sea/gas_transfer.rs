@@ -159,4 +159,43 @@ mod tests {
         assert!(nightingale2000(f64::NAN, 49.0, 660.0).is_nan());
         assert!(liss_merlivat1986(f64::NAN, 660.0).is_nan());
     }
+
+    /// FluxEngine 4.2.1, `core/rate_parameterisation.py`, `k_Wanninkhof2014` and the like at a Schmidt number that none is scaled to;
+    /// 2009 of Takahashi by its `k_generic` with the coefficients of its `takahashi09_verification.conf`. A steady wind of 12 m s⁻¹.
+    #[test]
+    fn at_another_schmidt_number_they_are_those_of_another_program() {
+        let (u, u2, u3) = (12.0, 144.0, 1728.0);
+        is(wanninkhof2014(u2, 1000.0), 29.363_524_409_716_213);
+        is(wanninkhof1992(u2, 1000.0), 36.265_707_438_294_925);
+        is(nightingale2000(u, u2, 1000.0), 27.857_594_612_600_707);
+        is(mcgillis2001(u3, 1000.0), 39.180_612_417_878_31);
+        is(ho2006(u2, 1000.0), 29.670_150_818_625_782);
+        is(takahashi2009(u2, 1000.0), 30.416_399_786_957_033);
+    }
+
+    /// `pyseaflux` 2.2.1, `gas_transfer_velocity.py`, `k_Sw07` and the like of 7 m s⁻¹ at 20 °C, where its Schmidt number is 668.344.
+    #[test]
+    fn those_that_one_program_lacks_are_those_of_a_second() {
+        let (u, u2, u3, schmidt) = (7.0, 49.0, 343.0, 668.344);
+        is(sweeney2007(u2, schmidt), 13.147_155_061_893_306);
+        is(wanninkhof2009(u, u2, u3, schmidt), 10.542_567_502_012_554);
+        // It takes 600 for the paper's Schmidt number of 660.
+        let at_600 = 9.197_211_082_751_176;
+        is(
+            wanninkhof_mcgillis1999(u3, schmidt),
+            at_600 * (660.0f64 / 600.0).sqrt(),
+        );
+    }
+
+    /// `pyseaflux` 2.2.1, `k_Li86`, of 3 m s⁻¹ at 0 °C, 7 at 10 °C and 15 at 30 °C. It writes the upper two lines `2.8 (U - 3.4)` and
+    /// `5.9 (U - 8.4)`, ours are `2.85 (U - 3.386)` and `5.9 (U - 8.356)`: 2.2 and 0.7 percent more.
+    #[test]
+    fn liss_and_merlivat_are_near_those_of_another_program() {
+        is(liss_merlivat1986(3.0, 2116.8), 0.220_065_075_488_680_57);
+        let rough = liss_merlivat1986(7.0, 1143.078) / CM_H / 7.302_948_266_791_492;
+        let breaking = liss_merlivat1986(15.0, 410.736) / CM_H / 47.064_146_548_961_716;
+        // By hand, of the two lines alone: 10.3 / 10.08 and 39.2 / 38.94.
+        assert!((rough - 10.3 / 10.08).abs() < 1e-9, "{rough}");
+        assert!((breaking - 39.2 / 38.94).abs() < 1e-9, "{breaking}");
+    }
 }

@@ -44,4 +44,28 @@ mod tests {
         }
         assert!(wanninkhof2014(f64::NAN).is_nan());
     }
+
+    /// FluxEngine 4.2.1, `core/fe_core.py`, `schmidt_Wanninkhof1992` and `schmidt_Wanninkhof2014` of CO2, °C.
+    #[test]
+    fn they_are_those_of_another_program() {
+        for (celsius, old, new) in [
+            (0.0, 2073.1, 2116.8),
+            (5.0, 1530.287_625_000_000_2, 1542.866_312_5),
+            (10.0, 1136.440_999_999_999_8, 1143.078_000_000_000_2),
+            (20.0, 665.987_999_999_999_8, 668.344),
+            (25.0, 524.553_124_999_999_9, 522.932_812_499_999_7),
+            (30.0, 402.426_999_999_999_7, 410.735_999_999_999_54),
+        ] {
+            let sst_k = celsius + ZERO_CELSIUS_K;
+            let (ours_1992, ours_2014) = (wanninkhof1992(sst_k), wanninkhof2014(sst_k));
+            assert!(
+                (ours_1992 / old - 1.0).abs() < 1e-12,
+                "{celsius} {ours_1992}"
+            );
+            assert!(
+                (ours_2014 / new - 1.0).abs() < 1e-12,
+                "{celsius} {ours_2014}"
+            );
+        }
+    }
 }

@@ -26,5 +26,7 @@ mod tests {
         assert!((donlon2002(8.5) - DONLON_2002_WINDY_K).abs() < 0.002);
         // By hand at 3.7 m/s: -0.14 - 0.30 / e.
         assert!((donlon2002(3.7) + 0.250_363_8).abs() < 1e-6);
+        // FluxEngine 4.2.1, `core/settings.xml`, `cool_skin_difference`: what it takes off where nothing else is said.
+        assert!((DONLON_2002_WINDY_K + 0.17).abs() < 1e-12);
     }
 }

@@ -68,4 +68,19 @@ mod tests {
             assert!((ratio / density - 1.0).abs() < 5e-4, "{ratio} {density}");
         }
     }
+
+    /// FluxEngine 4.2.1, `core/fe_core.py`, `solubility_Wanninkhof2014` of CO2, mol l⁻¹ atm⁻¹.
+    #[test]
+    fn by_volume_it_is_that_of_another_program() {
+        for (sst_k, salinity, per_atm) in [
+            (273.15, 35.0, 0.064_647_129_599_426_45),
+            (283.15, 33.0, 0.045_520_857_551_612_92),
+            (298.15, 35.0, 0.029_058_930_310_620_932),
+            (303.15, 38.0, 0.025_397_221_939_415_41),
+            (293.15, 0.0, 0.039_098_765_313_060_16),
+        ] {
+            let ours = weiss1974(sst_k, salinity) * ATMOSPHERE_PA / LITRES_PER_M3;
+            assert!((ours / per_atm - 1.0).abs() < 1e-12, "{ours} {per_atm}");
+        }
+    }
 }
