@@ -94,7 +94,7 @@ fn is_bin(step: TimeStep, period: Period) -> bool {
 /// Periods as long as the first, one after the other, to the end of the last.
 fn equal_lengths(first: Period, last: Period) -> Option<Vec<Period>> {
     let length_ms = first.end.ms() - first.start.ms();
-    let count = (last.end.ms() - first.start.ms()) / length_ms;
+    let count = (last.end.ms() - first.start.ms()).checked_div(length_ms)?;
     if count > MOST_LENGTHS {
         return None;
     }
