@@ -32,7 +32,7 @@ pub(crate) const DIGEST_CHUNK: u64 = 256;
 /// Bytes of a digest.
 pub(crate) const DIGEST_BYTES: u64 = 32;
 /// What compresses values of steps: level 3 takes twice as long for a thousandth fewer bytes, and level 6 four times as long for three
-/// thousandths (docs/decisions/040-quick-landing.md).
+/// thousandths (docs/decisions/037-quick-landing.md).
 const VALUES_ZSTD_LEVEL: i32 = 1;
 /// What compresses all else that is small: levels of steps, coordinates, digests.
 const ZSTD_LEVEL: i32 = 3;

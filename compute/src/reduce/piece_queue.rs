@@ -8,8 +8,18 @@ use tokio::task::{JoinHandle, spawn_blocking};
 
 use super::accumulator::Accumulated;
 use super::question::Piece;
-use super::task::Worker;
 use crate::ComputeError;
+
+/// Reads a piece and reduces it.
+pub(super) trait Reduce:
+    AsyncFn(Piece) -> Result<Accumulated, ComputeError> + Send + Sync + 'static
+{
+}
+
+impl<R> Reduce for R where
+    R: AsyncFn(Piece) -> Result<Accumulated, ComputeError> + Send + Sync + 'static
+{
+}
 
 /// Pieces that nobody works on yet.
 struct PieceQueue(Mutex<std::vec::IntoIter<Piece>>);
@@ -24,10 +34,10 @@ impl PieceQueue {
         *self.0.lock().unwrap_or_else(PoisonError::into_inner) = vec![].into_iter();
     }
 
-    async fn work_off(&self, worker: &Worker) -> Result<Accumulated, ComputeError> {
+    async fn work_off(&self, reduce: &impl Reduce) -> Result<Accumulated, ComputeError> {
         let mut all = Accumulated::default();
         while let Some(piece) = self.next() {
-            let reduced = worker.reduce(piece).await;
+            let reduced = reduce(piece).await;
             let merged = reduced.and_then(|part| all.merge(part));
             if merged.is_err() {
                 self.clear();
@@ -47,21 +57,23 @@ impl Drop for Awaited {
     }
 }
 
-/// What all pieces come to, worked on by as many threads as `at_once`.
+/// What all pieces come to, reduced by as many threads as `at_once`, which `reduce` keeps busy.
 ///
 /// # Errors
-/// As [`Worker::reduce`]; sums that leave their range.
+/// As `reduce`; sums that leave their range.
 pub(super) async fn reduced(
-    worker: &Worker,
+    reduce: impl Reduce,
     pieces: Vec<Piece>,
     at_once: usize,
 ) -> Result<Accumulated, ComputeError> {
     let thread_count = at_once.clamp(1, pieces.len().max(1));
     let queue = Arc::new(PieceQueue(Mutex::new(pieces.into_iter())));
     let awaited = Awaited(Arc::clone(&queue));
+    let reduce = Arc::new(reduce);
     let thread = |_number: usize| {
-        let (worker, queue, runtime) = (worker.clone(), Arc::clone(&queue), Handle::current());
-        spawn_blocking(move || runtime.block_on(queue.work_off(&worker)))
+        let (reduce, queue) = (Arc::clone(&reduce), Arc::clone(&queue));
+        let runtime = Handle::current();
+        spawn_blocking(move || runtime.block_on(queue.work_off(&*reduce)))
     };
     let threads: Vec<JoinHandle<_>> = (0..thread_count).map(thread).collect();
     let mut all = Accumulated::default();

@@ -68,7 +68,8 @@ async fn in_process(
     // One is read while the others are reduced; each is held as it was stored, and as it is reduced.
     let held = engine.memory_bytes() / (4 * PIECE_BYTES as usize);
     let at_once = (engine.partitions().get() + 1).min(held.max(1));
-    piece_queue::reduced(&worker, pieces, at_once).await
+    let reduce = async move |piece| worker.reduce(piece).await;
+    piece_queue::reduced(reduce, pieces, at_once).await
 }
 
 async fn distributed(

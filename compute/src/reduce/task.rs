@@ -105,7 +105,8 @@ impl Task {
             return Ok(None);
         }
         let worker = Worker::new(objects, self.question, values).await?;
-        match piece_queue::reduced(&worker, self.pieces, 1).await {
+        let reduce = async move |piece| worker.reduce(piece).await;
+        match piece_queue::reduced(reduce, self.pieces, 1).await {
             // Chunks that are gone or damaged: the fields say what they held.
             Err(ComputeError::Cube(error)) if !error.is_retryable() => {
                 tracing::warn!(%error, "a cube cannot be read");
