@@ -20,6 +20,7 @@ mod encoded_sums;
 mod error;
 mod field;
 mod field_bands;
+mod field_windows;
 mod follow;
 pub mod foreign;
 mod group;

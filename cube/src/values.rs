@@ -11,6 +11,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use contract::chunk::Window;
+use contract::key::ObjectKey;
 use contract::kind::Vouched;
 use contract::manifest::Manifest;
 use futures::future::BoxFuture;
@@ -19,6 +20,7 @@ use storage::{Store, fields};
 
 use crate::blocks::with_decoder;
 use crate::field_bands::FieldBands;
+use crate::field_windows::{FieldWindows, Found};
 use crate::follow::folder;
 use crate::joined::joined_window;
 use crate::layout::{BLOCK_CELLS, RUN_STEPS};
@@ -37,7 +39,7 @@ const FIELDS_AT_ONCE: usize = 2;
 enum Place {
     /// At its place in one of the states of the cube.
     Cube { cube: usize, step: usize },
-    /// In its field, whole.
+    /// In its field.
     Field,
 }
 
@@ -218,7 +220,7 @@ impl Values {
         !places.contains(&Place::Field) && cubes.iter().all(is_compact)
     }
 
-    /// Steps that have to be read from their fields, whole.
+    /// Steps that have to be read from their fields.
     pub fn in_fields_count(&self) -> usize {
         let places = self.0.places.iter();
         places.filter(|place| **place == Place::Field).count()
@@ -304,7 +306,7 @@ impl Values {
     }
 
     /// Values of some windows of cells of one step, `[row, col]` of each, in the order asked: of its map-major chunks those that
-    /// they touch, each once; the whole field where the cube does not have the step.
+    /// they touch, each once; where the cube does not have the step, of the field's.
     ///
     /// # Errors
     /// As [`Values::cell`].
@@ -332,12 +334,9 @@ impl Values {
                         return Err(self.outside(&format!("{window:?}")));
                     }
                 }
-                let values = fields::read(store, &manifest.steps[step].field, grid).await?;
-                let of = |window: &Window| {
-                    let own = window.cell_indices(grid);
-                    own.map(|index| values[index]).collect()
-                };
-                Ok(windows.iter().map(of).collect())
+                let field = &manifest.steps[step].field;
+                let reader = fields::Reader::open(store, field, Some(grid)).await?;
+                Ok(reader.windows(windows).await?)
             }
         }
     }
@@ -473,12 +472,7 @@ impl Values {
 
     /// Fills blocks with the values of some steps.
     async fn read(&self, blocks: &mut [Block], steps: Range<usize>) -> Result<(), CubeError> {
-        let Inner {
-            store,
-            manifest,
-            cubes,
-            ..
-        } = &*self.0;
+        let cubes = &self.0.cubes;
         let reads = self.reads(&steps);
         let asked: Vec<[u32; 2]> = blocks.iter().map(|block| block.at).collect();
         let windows: Vec<Window> = blocks.iter().map(|block| block.window).collect();
@@ -500,33 +494,92 @@ impl Values {
                 run.put(blocks, steps.len());
             }
         }
-        let windows = &windows;
+        self.read_maps(blocks, &windows, (reads.maps, &steps)).await?;
+        self.read_fields(blocks, &windows, (reads.fields, &steps))
+            .await
+    }
+
+    /// Fills blocks with the values of steps that no run holds: from a few chunks of their fields, or from maps in the cube.
+    async fn read_maps(
+        &self,
+        blocks: &mut [Block],
+        windows: &[Window],
+        (maps, steps): (Vec<(usize, usize, usize)>, &Range<usize>),
+    ) -> Result<(), CubeError> {
+        let Inner {
+            store,
+            manifest,
+            cubes,
+            ..
+        } = &*self.0;
+        let of_fields = FieldWindows::new(store, &manifest.grid, windows);
+        if !maps.is_empty() && of_fields.are_quicker() {
+            let field = |(_cube, _step, asked): &(usize, usize, usize)| {
+                let field = &manifest.steps[steps.start + asked].field;
+                (field.clone(), *asked)
+            };
+            match of_fields.of(maps.iter().map(field).collect()).await {
+                Ok(found) => {
+                    put_maps(blocks, &found, steps.len());
+                    return Ok(());
+                }
+                Err(error) if error.is_retryable() => return Err(error),
+                // The cube holds the same values.
+                Err(error) => tracing::warn!(%error, "a field cannot be read: the cube is"),
+            }
+        }
         let read = |(cube, step, asked): (usize, usize, usize)| async move {
             let maps = cubes[cube].windows(step, windows).await?;
             Ok::<_, CubeError>((asked, maps))
         };
-        let mut found = stream::iter(reads.maps).map(read).buffered(STEPS_AT_ONCE);
-        while let Some((asked, maps)) = found.try_next().await? {
-            for (block, map) in blocks.iter_mut().zip(&maps) {
-                block.put_map(map, asked, steps.len());
-            }
+        let mut found = stream::iter(maps).map(read).buffered(STEPS_AT_ONCE);
+        while let Some(found) = found.try_next().await? {
+            put_maps(blocks, &[found], steps.len());
         }
-        let read = |(step, asked): (usize, usize)| async move {
-            let field = &manifest.steps[step].field;
-            let values = fields::read(store, field, &manifest.grid).await?;
+        Ok(())
+    }
+
+    /// Fills blocks with the values of steps that the cube does not have.
+    async fn read_fields(
+        &self,
+        blocks: &mut [Block],
+        windows: &[Window],
+        (asked, steps): (Vec<(usize, usize)>, &Range<usize>),
+    ) -> Result<(), CubeError> {
+        let Inner {
+            store, manifest, ..
+        } = &*self.0;
+        let grid = &manifest.grid;
+        let asked = asked.into_iter();
+        let asked = asked.map(|(step, asked)| (manifest.steps[step].field.clone(), asked));
+        let of_fields = FieldWindows::new(store, grid, windows);
+        if of_fields.are_few() {
+            let found = of_fields.of(asked.collect()).await?;
+            put_maps(blocks, &found, steps.len());
+            return Ok(());
+        }
+        let read = |(field, asked): (ObjectKey, usize)| async move {
+            let values = fields::read(store, &field, grid).await?;
             Ok::<_, CubeError>((asked, values))
         };
-        let mut found = stream::iter(reads.fields)
-            .map(read)
-            .buffered(FIELDS_AT_ONCE);
+        let mut found = stream::iter(asked).map(read).buffered(FIELDS_AT_ONCE);
         while let Some((asked, values)) = found.try_next().await? {
             for block in blocks.iter_mut() {
-                let own = block.window.cell_indices(&manifest.grid);
+                let own = block.window.cell_indices(grid);
                 let map: Vec<f32> = own.map(|index| values[index]).collect();
                 block.put_map(&map, asked, steps.len());
             }
         }
         Ok(())
+    }
+}
+
+/// Puts values of steps into blocks, by the number of each among so many that are asked for.
+fn put_maps(blocks: &mut [Block], found: &[Found], steps: usize) {
+    for (asked, maps) in found {
+        for (block, map) in blocks.iter_mut().zip(maps) {
+            block.put_map(map, *asked, steps);
+        }
     }
 }
 

@@ -141,10 +141,10 @@ class Cluster:
         store = f"file:{self.folder / 'data' / 'objects'}"
         command = [str(self.options.program), *map(str, words)]
         environment = {**os.environ, "FLUXGLOBE_STORE": store, **(self.settings if words[0] == "executor" else {})}
-        # An executor has a processor of its own, as in a pod of one; scheduler and command have the first two.
-        processors = sorted(os.sched_getaffinity(0))
+        # An executor has a core of its own, as in a pod of one, as long as there are so many; scheduler and command have the last two processors.
+        processors = by_core()
         number = len(self.processes)
-        own = {processors[(number + 1) % len(processors)]} if number > 0 else set(processors[:2])
+        own = {processors[(number - 1) % len(processors)]} if number > 0 else set(processors[-2:])
 
         def pinned():
             os.sched_setaffinity(0, own)
@@ -156,6 +156,23 @@ class Cluster:
             process.kill()
         for process in self.processes:
             process.wait()
+
+
+def by_core():
+    """Processors that may be used: one of each core, then those that share a core with one of these."""
+
+    def core(processor):
+        topology = Path(f"/sys/devices/system/cpu/cpu{processor}/topology")
+        try:
+            return tuple(int((topology / name).read_text()) for name in ("physical_package_id", "core_id"))
+        except (OSError, ValueError):
+            return processor
+
+    seen, first, others = set(), [], []
+    for processor in sorted(os.sched_getaffinity(0)):
+        (others if core(processor) in seen else first).append(processor)
+        seen.add(core(processor))
+    return first + others
 
 
 def median(values):

@@ -63,6 +63,21 @@ impl Question {
         Some(Digest::of_json(&(weights, self.scale, wanted)))
     }
 
+    /// The same of some pieces alone: without what it says of other steps.
+    pub(super) fn about(&self, pieces: &[Piece]) -> Self {
+        let mut own = self.clone();
+        if let Wanted::Histograms { steps, .. } = &mut own.wanted {
+            let mut asked: Vec<Range<usize>> = pieces.iter().map(Piece::of_version).collect();
+            asked.sort_unstable_by_key(|range| (range.start, range.end));
+            asked.dedup();
+            steps.retain(|step, _| {
+                let step = *step as usize;
+                asked.iter().any(|range| range.contains(&step))
+            });
+        }
+        own
+    }
+
     /// How values count in stored sums that it can be answered from, if it can be from any: they know no extremes.
     pub(super) fn in_stored_sums(&self) -> Option<Scale> {
         match self.wanted {

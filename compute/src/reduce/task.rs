@@ -1,7 +1,6 @@
 //! A piece of a question: some blocks of a run of steps, or chunks of a field, read, reduced and forgotten.
 
-use std::cmp::Reverse;
-use std::collections::{BTreeSet, BinaryHeap};
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use contract::chunk::Window;
@@ -49,27 +48,30 @@ impl Task {
         self.pieces.iter().map(Piece::cost_bytes).sum()
     }
 
-    /// Its pieces as at most `count` tasks, none of them idle, each with about as much to read as the others.
-    pub(crate) fn dealt(self, count: usize) -> Vec<Self> {
-        let count = count.clamp(1, self.pieces.len().max(1));
-        let task = |_part| Self {
-            question: self.question.clone(),
-            pieces: vec![],
-        };
-        let mut tasks: Vec<Self> = (0..count).map(task).collect();
-        // The largest first, each to who has least: a list that alternates would make every other task a long one.
-        let mut pieces = self.pieces;
-        pieces.sort_by_key(|piece| Reverse(piece.cost_bytes()));
-        let mut least: BinaryHeap<Reverse<(u64, usize)>> =
-            (0..count).map(|at| Reverse((0, at))).collect();
-        for piece in pieces {
-            let Some(Reverse((bytes, at))) = least.pop() else {
-                break;
-            };
-            least.push(Reverse((bytes + piece.cost_bytes().max(1), at)));
-            tasks[at].pieces.push(piece);
+    /// Its pieces as at most `count` tasks, none of them idle, each with about as much to read as the others: steps that lie side by side go
+    /// together. A task then tells of few steps and few ranges of percentiles, each of which is merged once or twice and not once a task, and
+    /// has its share of land and of sea.
+    pub(crate) fn dealt(mut self, count: usize) -> Vec<Self> {
+        let cost = |piece: &Piece| u128::from(piece.cost_bytes().max(1));
+        let all: u128 = self.pieces.iter().map(cost).sum();
+        self.pieces.sort_by_key(|piece| piece.first_step);
+        let mut before = 0;
+        let mut tasks: BTreeMap<u128, Vec<Piece>> = BTreeMap::new();
+        for piece in self.pieces {
+            // By its middle: who has half of it more than the others gets it.
+            let own = cost(&piece);
+            let at = (2 * before + own) * count.max(1) as u128 / (2 * all);
+            before += own;
+            tasks.entry(at).or_default().push(piece);
         }
-        tasks
+        if tasks.is_empty() {
+            tasks.insert(0, vec![]);
+        }
+        let task = |pieces: Vec<Piece>| Self {
+            question: self.question.about(&pieces),
+            pieces,
+        };
+        tasks.into_values().map(task).collect()
     }
 
     /// Works on its pieces one after the other. None where this process does not find along time what they were to be read

@@ -3,6 +3,7 @@
 //! Every chunk is compared with its own check. The name of a field vouches for all of its values: who reads all bands
 //! ([`Reader::bands`]) learns at the end whether they are those.
 
+use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -26,6 +27,8 @@ use crate::{StorageError, Store};
 
 /// Columns of the period.
 const PERIOD: [&str; 2] = ["period_start", "period_end"];
+/// So many chunks take less time to decode than another thread to begin.
+const CHUNKS_AT_HAND: usize = 2;
 
 /// A field that is read in parts; clones share what is known of its file.
 #[derive(Debug, Clone)]
@@ -155,40 +158,73 @@ impl Reader {
     /// # Errors
     /// Its grid has no such cells; they cannot be read, or are not what their checks say.
     pub async fn window(&self, window: Window) -> Result<Vec<f32>, StorageError> {
-        let inside = |first: u32, count: u32, all: u32| {
-            count > 0 && first.checked_add(count).is_some_and(|end| end <= all)
-        };
-        if !inside(window.row, window.rows, self.grid.rows)
-            || !inside(window.col, window.cols, self.grid.cols)
-        {
-            let reason = format!(
-                "{window:?} was asked for of {} x {} cells",
-                self.grid.rows, self.grid.cols
-            );
-            return Err(StorageError::damaged(self.stored.key.as_str(), reason));
+        let mut values = self.windows(&[window]).await?;
+        Ok(values.pop().unwrap_or_default())
+    }
+
+    /// The same of some windows, in the order asked: a chunk that several of them lie in is read once.
+    ///
+    /// # Errors
+    /// As of [`Reader::window`].
+    pub async fn windows(&self, windows: &[Window]) -> Result<Vec<Vec<f32>>, StorageError> {
+        for window in windows {
+            self.check(*window)?;
         }
         let (index, chunks) = match &self.source {
             Source::Held(values) => {
-                let cells = window.cell_indices(&self.grid);
-                return Ok(cells.map(|cell| values[cell]).collect());
+                let of = |window: &Window| {
+                    let cells = window.cell_indices(&self.grid);
+                    cells.map(|cell| values[cell]).collect()
+                };
+                return Ok(windows.iter().map(of).collect());
             }
             Source::Rows { index, chunks, .. } => (Arc::clone(index), Arc::clone(chunks)),
         };
-        let wanted = chunks_of(&self.grid, window);
+        let mut touched: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
+        for (number, window) in windows.iter().enumerate() {
+            for chunk in chunks_of(&self.grid, *window) {
+                touched.entry(chunk).or_default().push(number);
+            }
+        }
+        let wanted: Vec<u32> = touched.keys().copied().collect();
+        let is_quick = wanted.len() <= CHUNKS_AT_HAND;
         let fetched = rows::fetch(&self.stored, Some(index), wanted).await?;
-        let period = self.period;
-        off_thread(move || {
-            let mut values = vec![f32::NAN; window.cell_count()];
+        let (period, windows) = (self.period, windows.to_vec());
+        let picked = move || {
+            let blank = |window: &Window| vec![f32::NAN; window.cell_count()];
+            let mut values: Vec<Vec<f32>> = windows.iter().map(blank).collect();
             fetched.each(
                 |chunk| expected(&chunks, chunk, period),
                 |chunk, found| {
-                    copy(chunks[chunk as usize], found, window, &mut values);
+                    for number in &touched[&chunk] {
+                        let own = &mut values[*number];
+                        copy(chunks[chunk as usize], found, windows[*number], own);
+                    }
                     Ok::<_, StorageError>(())
                 },
             )?;
             Ok(values)
-        })
-        .await
+        };
+        if is_quick {
+            return picked();
+        }
+        off_thread(picked).await
+    }
+
+    fn check(&self, window: Window) -> Result<(), StorageError> {
+        let inside = |first: u32, count: u32, all: u32| {
+            count > 0 && first.checked_add(count).is_some_and(|end| end <= all)
+        };
+        if inside(window.row, window.rows, self.grid.rows)
+            && inside(window.col, window.cols, self.grid.cols)
+        {
+            return Ok(());
+        }
+        let reason = format!(
+            "{window:?} was asked for of {} x {} cells",
+            self.grid.rows, self.grid.cols
+        );
+        Err(StorageError::damaged(self.stored.key.as_str(), reason))
     }
 
     /// All of it, band by band from the north, each of at most [`BAND_CELLS`] cells or one row of chunks.

@@ -11,6 +11,7 @@ use storage::Store;
 
 use super::*;
 use crate::Objects;
+use crate::reduce::histogram::Buckets;
 use crate::reduce::inside::InsideRun;
 use crate::reduce::question::{Layout, Wanted};
 
@@ -119,6 +120,38 @@ fn tasks_have_about_as_much_to_read_whatever_the_order_of_pieces() {
         let most = costs.iter().max().unwrap();
         assert!(most * count as u64 <= whole * 5 / 4, "{count}: {costs:?}");
     }
+}
+
+#[test]
+fn a_task_has_steps_side_by_side_and_is_told_of_no_others() {
+    // Two pieces of each run, which come run by run or all of a kind.
+    let twice = pieces(12).into_iter().chain(pieces(12)).collect();
+    let ranges: Vec<Buckets> = (0..60).map(|at| Buckets::new(at, at + 9, 4)).collect();
+    let all = Task {
+        question: Question {
+            wanted: Wanted::Histograms {
+                ranges: ranges.clone(),
+                steps: (0..60).map(|step| (step, vec![(step, 1)])).collect(),
+            },
+            ..question()
+        },
+        pieces: twice,
+    };
+    let mut next = 0;
+    for task in all.dealt(5) {
+        let starts = task.pieces.iter().map(|piece| piece.first_step);
+        let starts: Vec<u32> = starts.collect();
+        let (first, last) = (starts[0], starts[starts.len() - 1]);
+        assert!(starts.is_sorted() && first <= next, "{starts:?}");
+        next = last + 5;
+        let Wanted::Histograms { ranges: own, steps } = &task.question.wanted else {
+            panic!("another question");
+        };
+        assert_eq!(*own, ranges);
+        let told: Vec<u32> = steps.keys().copied().collect();
+        assert_eq!(told, (first..last + 5).collect::<Vec<u32>>());
+    }
+    assert_eq!(next, 60);
 }
 
 #[tokio::test]

@@ -128,6 +128,30 @@ async fn rows_and_windows_are_those_of_the_whole_field() {
 }
 
 #[tokio::test]
+async fn windows_are_read_together_as_they_are_one_by_one() {
+    let (store, whole) = (Store::memory(), values());
+    let key = stored(&store).await;
+    let reader = Reader::open(&store, &key, Some(&GRID)).await.unwrap();
+    let window = |row: u32, col: u32, rows: u32, cols: u32| Window {
+        row,
+        col,
+        rows,
+        cols,
+    };
+    // In one chunk, in two of them, over the corner of four, and twice the same.
+    let one = window(3, 5, 1, 1);
+    let asked = [one, window(58, 7, 4, 2), window(119, 239, 2, 2), one];
+    for some in [&asked[..1], &asked[..2], &asked] {
+        let found = reader.windows(some).await.unwrap();
+        for (window, found) in some.iter().zip(found) {
+            let own: Vec<f32> = window.cell_indices(&GRID).map(|at| whole[at]).collect();
+            assert_eq!(bits(&found), bits(&own), "{window:?}");
+        }
+    }
+    assert!(reader.windows(&[one, window(435, 0, 1, 1)]).await.is_err());
+}
+
+#[tokio::test]
 async fn only_the_bytes_of_a_window_are_read() {
     let store = Store::memory();
     let key = stored(&store).await;
