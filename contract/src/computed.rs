@@ -102,6 +102,8 @@ pub enum Matching {
     /// That of the very same period.
     #[default]
     SamePeriod,
+    /// The one that holds all of it: a month for each of its days.
+    Containing,
     /// That of the same month of the one year that the input has: a climatology.
     MonthOfYear,
     /// The one step that there is, at any time: a mask.
@@ -121,10 +123,12 @@ impl FromStr for Matching {
     fn from_str(s: &str) -> Result<Self, Self::Err> {
         match s {
             "same-period" => Ok(Self::SamePeriod),
+            "containing" => Ok(Self::Containing),
             "climatology" => Ok(Self::MonthOfYear),
             "any-time" => Ok(Self::AnyTime),
             _ => {
-                let valid = "use same-period, climatology (its one year holds in every year) or any-time (its one step holds always)";
+                let valid = "use same-period, containing (its months hold in all of their days), climatology (its one year holds in every year) \
+                             or any-time (its one step holds always)";
                 Err(ContractError::invalid("matching of periods", s, valid))
             }
         }
@@ -154,5 +158,6 @@ mod tests {
         assert!("cubic".parse::<Regridding>().is_err());
         assert!("monthly".parse::<Matching>().is_err());
         assert_eq!("climatology".parse(), Ok(Matching::MonthOfYear));
+        assert_eq!("containing".parse(), Ok(Matching::Containing));
     }
 }

@@ -129,7 +129,7 @@ pub(super) fn steps(
 ) -> Result<Matches, ComputeError> {
     let by_period = |input: &&Input| input.matching == Matching::SamePeriod;
     let Some(lead) = inputs.iter().find(by_period) else {
-        let reason = "one input must say which periods the result has: leave climatology and any-time away from it";
+        let reason = "one input must say which periods the result has: leave containing, climatology and any-time away from it";
         return Err(refused(reason.to_owned()));
     };
     inputs.iter().try_for_each(fits_its_matching)?;
@@ -151,7 +151,8 @@ pub(super) fn steps(
     if found.is_empty() {
         return Err(refused(format!(
             "there is no period that all inputs have: {}; \
-             an input of one year that holds in every year is marked climatology, one that holds always any-time",
+             an input whose steps hold in shorter ones is marked containing, one of one year that holds in every year \
+             climatology, one that holds always any-time",
             inputs
                 .iter()
                 .map(extent_in_words)
@@ -183,7 +184,7 @@ fn extent_in_words(input: &Input) -> String {
 fn fits_its_matching(input: &Input) -> Result<(), ComputeError> {
     let (name, steps) = (&input.name, &input.manifest.steps);
     match input.matching {
-        Matching::SamePeriod => Ok(()),
+        Matching::SamePeriod | Matching::Containing => Ok(()),
         Matching::AnyTime if steps.len() == 1 => Ok(()),
         Matching::AnyTime => Err(refused(format!(
             "{name} has {} steps; any-time takes a product of one",
@@ -214,16 +215,26 @@ fn month_of(step: &Step) -> Option<(i32, u32)> {
     (Period::month(year, month) == Ok(step.period)).then_some((year, month))
 }
 
+/// Does one period hold all of another?
+fn holds(one: Period, other: Period) -> bool {
+    one.start <= other.start && other.end <= one.end
+}
+
 /// The field of an input that belongs to a period.
 fn field_of(input: &Input, period: Period) -> Option<ObjectKey> {
     let steps = &input.manifest.steps;
     let step = match input.matching {
         Matching::SamePeriod => &steps[input.manifest.step_of(period)?],
+        Matching::Containing => {
+            let after = steps.partition_point(|step| step.period.start <= period.start);
+            let step = &steps[after.checked_sub(1)?];
+            holds(step.period, period).then_some(step)?
+        }
         Matching::AnyTime => steps.first()?,
         Matching::MonthOfYear => {
             let (year, month) = period.start.year_month();
-            let is_month = Period::month(year, month) == Ok(period);
-            steps.get(month as usize - 1).filter(|_| is_month)?
+            let is_inside = Period::month(year, month).is_ok_and(|own| holds(own, period));
+            steps.get(month as usize - 1).filter(|_| is_inside)?
         }
     };
     Some(step.field.clone())

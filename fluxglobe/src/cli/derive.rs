@@ -33,7 +33,8 @@ It is SQL's: + - * /, comparisons, AND OR NOT BETWEEN, CASE WHEN .. THEN .. ELSE
 least coalesce, and the functions of the air-sea flux that `fluxglobe derive functions` lists with their papers.
 Products are in SI units; a number with a unit is written unit(5, 'hPa'), and different units are never added.
 No data in an input is no data in the result, but where it stands in coalesce(ice, 0).
-An input of one year that holds in every year is marked :climatology, one that holds always :any-time:
+An input whose months hold in all of their days is marked :containing, one of one year that holds in every year
+:climatology, one that holds always :any-time:
 
   --input salt=takahashi09-salinity:climatology --input land=onedeg-land:any-time
 
@@ -78,7 +79,7 @@ pub(crate) struct Expression {
     /// (`wind_moment2:m2 s-2`); its unit must be that of the expression.
     #[arg(long, value_parser = quantity)]
     pub(crate) quantity: Option<Quantity>,
-    /// NAME=PRODUCT or NAME=PRODUCT:climatology or NAME=PRODUCT:any-time; a name each in the expression.
+    /// NAME=PRODUCT or NAME=PRODUCT:containing, :climatology or :any-time; a name each in the expression.
     #[arg(long = "input", value_parser = input, value_name = "NAME=PRODUCT[:MATCHING]")]
     pub(crate) inputs: Vec<RequestedInput>,
     #[command(flatten)]

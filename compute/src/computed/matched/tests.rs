@@ -85,6 +85,40 @@ fn periods_of_all_are_matched_a_climatology_by_month_and_a_mask_always() {
 }
 
 #[test]
+fn days_take_the_month_that_they_lie_in_and_weeks_over_its_end_none() {
+    let grid = one_degree(3);
+    let days = |text: &str, count: i64| {
+        let start: TimeMs = text.parse().unwrap();
+        let end = TimeMs::new(start.ms() + count * 86_400_000).unwrap();
+        Period::new(start, end).unwrap()
+    };
+    let periods = [
+        days("2010-01-31", 1),
+        days("2010-02-01", 1),
+        days("2010-02-26", 7),
+        days("2010-05-02", 1),
+    ];
+    let inputs = [
+        input("wind", grid, &periods, Matching::SamePeriod),
+        input("sst", grid, &months(2010, 1..=4), Matching::Containing),
+        input("salt", grid, &months(2000, 1..=12), Matching::MonthOfYear),
+    ];
+    let found = steps(&inputs, (None, None)).unwrap();
+    // The week ends in March; the input has no May.
+    assert_eq!((found.steps.len(), found.left_out), (2, 2));
+    for (step, month) in found.steps.iter().zip([0, 1]) {
+        for of in [1, 2] {
+            let own = &inputs[of].manifest.steps[month];
+            assert_eq!(step.fields[of], own.field, "{of} in month {month}");
+        }
+    }
+    let early = [days("2009-12-31", 1)];
+    let wind = input("wind", grid, &early, Matching::SamePeriod);
+    let text = said(steps(&[wind, inputs[1].clone()], (None, None)));
+    assert!(text.contains("marked containing"), "{text}");
+}
+
+#[test]
 fn what_does_not_belong_together_is_refused_with_what_to_write() {
     let (grid, same) = (one_degree(3), Matching::SamePeriod);
     let monthly = input("wind", grid, &months(2010, 1..=12), same);
