@@ -11,6 +11,7 @@ mod cells;
 mod histogram;
 mod inside;
 mod kernel;
+mod number_runs;
 mod order;
 mod over_steps;
 mod percentiles;

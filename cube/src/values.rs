@@ -494,7 +494,8 @@ impl Values {
                 run.put(blocks, steps.len());
             }
         }
-        self.read_maps(blocks, &windows, (reads.maps, &steps)).await?;
+        self.read_maps(blocks, &windows, (reads.maps, &steps))
+            .await?;
         self.read_fields(blocks, &windows, (reads.fields, &steps))
             .await
     }

@@ -1,9 +1,9 @@
 """Statistics of a polygon on a Ballista cluster of 1, 2, 4 and 8 executors, one processor each, all on this machine.
 
 The made-up China Sea (`fluxglobe generate china-sea --years N`, 450 x 615 cells a day) is landed, and questions that read every
-value of a polygon are asked by the command line: of some 46,000 cells, and of all of the sea with percentiles by month, in several
+value of a polygon are asked of `fluxglobe serve` over HTTP: of some 46,000 cells, and of all of the sea with percentiles by month, in several
 passes. Every question is a new one, by a polygon that was not asked for before. Answers of any number of executors are compared
-with those of one process first, bit by bit.
+with those of a server without a cluster first, bit by bit.
 
 A machine with at least one processor an executor and two more says something; on a smaller one the figures are told with that.
 
@@ -37,14 +37,12 @@ def main():
         rows = []
         for name, words, shape in questions():
             tiles.say(name)
-            asked = [[*words, "--region", text] for text in shape]
-            alone = [ask(options, folder, product, words_, {}) for words_ in asked]
+            asked = [{**words, "region": text} for text in shape]
+            alone = answers(options, folder, product, asked, {})
             row = {"question": name, "in_process_s": median([seconds for seconds, _ in alone]), "executors": {}}
             for count in options.executors:
                 with Cluster(options, folder, count) as cluster:
-                    # The first question opens the version on every executor.
-                    ask(options, folder, product, [*words, "--region", "110,10,111,11"], cluster.settings)
-                    found = [ask(options, folder, product, words_, cluster.settings) for words_ in asked]
+                    found = answers(options, folder, product, asked, cluster.settings)
                 for (_, right), (_, other) in zip(alone, found):
                     if right != other:
                         sys.exit(f"{name}: {count} executors answer otherwise than one process")
@@ -85,24 +83,27 @@ def questions():
     def polygon(ring):
         return "POLYGON((" + ",".join(f"{x} {y}" for x, y in [*ring, ring[0]]) + "))"
 
+    sums = {"statistic": "mean,std,min,max", "step": "native"}
     some = [polygon(stats.outline(0.017 * at)) for at in range(REPEATS)]
-    yield "46,000 cells: mean, deviation, extremes of every day", ["--statistic", "mean,std,min,max", "--step", "native"], some
+    yield "46,000 cells: mean, deviation, extremes of every day", sums, some
     corners = [(100.1, 0.1), (115, 0.1), (129.9, 0.1), (129.9, 29.9), (100.1, 29.9)]
     whole = [polygon([(x + 0.013 * at, y + 0.011 * at) for x, y in corners]) for at in range(REPEATS)]
-    yield "all cells: mean, deviation, extremes of every day", ["--statistic", "mean,std,min,max", "--step", "native"], whole
-    yield "all cells: p5, median, p95 of every month", ["--statistic", "p5,median,p95", "--step", "month"], whole
+    yield "all cells: mean, deviation, extremes of every day", sums, whole
+    yield "all cells: p5, median, p95 of every month", {"statistic": "p5,median,p95", "step": "month"}, whole
 
 
-def ask(options, folder, product, words, settings):
-    """Seconds of the whole process, and what it printed."""
-    begin = time.perf_counter()
-    store = f"file:{folder / 'data' / 'objects'}"
-    environment = {**os.environ, "FLUXGLOBE_STORE": store, **settings}
-    asked = [options.program, "stats", "polygon", "--product", product, "--json", *words]
-    done = subprocess.run([str(word) for word in asked], capture_output=True, text=True, env=environment)
-    if done.returncode != 0:
-        sys.exit(f"{' '.join(map(str, asked))[:300]}: {done.stderr[-2000:]}")
-    return time.perf_counter() - begin, done.stdout
+def answers(options, folder, product, asked, settings):
+    """Seconds of each question to a server, over HTTP, and what it answered."""
+    os.environ.update(settings)
+    server = stats.Ours(options, folder, product)
+    for name in settings:
+        del os.environ[name]
+    try:
+        # The first question opens the version, on every executor too.
+        server.ask("area", "json", **{**asked[0], "region": "110,10,111,11"})
+        return [server.ask("area", "json", **own) for own in asked]
+    finally:
+        server.stop()
 
 
 class Cluster:
@@ -183,7 +184,7 @@ def print_table(rows, options):
     if options.json:
         print(json.dumps({"processors": os.cpu_count(), "rows": rows}, indent=1))
         return
-    print(f"{os.cpu_count()} processors, {options.years} years of days, 450 x 615 cells; seconds of the whole command")
+    print(f"{os.cpu_count()} processors, {options.years} years of days, 450 x 615 cells; seconds over HTTP")
     print(f"{'question':<58} {'in process':>10} " + " ".join(f"{count:>14}" for count in options.executors))
     for row in rows:
         one = row["executors"][options.executors[0]]

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::bytes::Reader;
+use super::bytes::{Reader, put_short};
 use super::order::number_of;
 
 /// Numbers of values ([`super::order`]) from `low` to `high`, cut into buckets of 2^`shift` of them.
@@ -102,41 +102,51 @@ impl Histograms {
         Some(())
     }
 
-    /// As it passes from process to process.
+    /// As it passes from process to process: of a range its number of buckets and those that hold weight, each by how many empty ones lie
+    /// before it. Weights have some 50 of their 128 bits.
     pub(super) fn write(&self, out: &mut Vec<u8>) {
-        out.extend((self.weights.len() as u32).to_le_bytes());
+        put_short(out, self.weights.len() as u128);
         for weights in &self.weights {
-            out.extend((weights.len() as u32).to_le_bytes());
-            let filled = || {
-                weights
-                    .iter()
-                    .enumerate()
-                    .filter(|(_, weight)| **weight != 0)
-            };
-            out.extend((filled().count() as u32).to_le_bytes());
-            for (bucket, weight) in filled() {
-                out.extend((bucket as u32).to_le_bytes());
-                out.extend(weight.to_le_bytes());
+            put_short(out, weights.len() as u128);
+            let weighty = (0..).zip(weights).filter(|(_, weight)| **weight != 0);
+            put_short(out, weighty.clone().count() as u128);
+            let mut next: u128 = 0;
+            for (bucket, weight) in weighty {
+                put_short(out, bucket - next);
+                put_short(out, zigzag(*weight));
+                next = bucket + 1;
             }
         }
     }
 
     /// The same back; none if it is cut off.
     pub(super) fn read(from: &mut Reader<'_>) -> Option<Self> {
-        /// Most buckets of a range, in bits: see `percentiles`.
-        const MAX_BUCKETS: u32 = 1 << 16;
+        /// Most buckets of a range: see `percentiles`.
+        const MAX_BUCKETS: u128 = 1 << 16;
         let mut all = Self::default();
-        for _ in 0..from.u32()? {
-            let count = from.u32().filter(|count| *count <= MAX_BUCKETS)?;
+        for _ in 0..from.short()? {
+            let count = from.short().filter(|count| *count <= MAX_BUCKETS)?;
             let mut weights = vec![0; count as usize];
-            for _ in 0..from.u32()? {
-                let bucket = from.u32()? as usize;
-                *weights.get_mut(bucket)? = from.i128()?;
+            let mut next: usize = 0;
+            for _ in 0..from.short()? {
+                let before = from.short().filter(|before| *before < MAX_BUCKETS)?;
+                let bucket = next + before as usize;
+                *weights.get_mut(bucket)? = unzigzag(from.short()?);
+                next = bucket + 1;
             }
             all.weights.push(weights);
         }
         Some(all)
     }
+}
+
+/// Numbers near 0 of either sign as small ones.
+fn zigzag(number: i128) -> u128 {
+    ((number << 1) ^ (number >> (i128::BITS - 1))).cast_unsigned()
+}
+
+fn unzigzag(number: u128) -> i128 {
+    (number >> 1).cast_signed() ^ -((number & 1).cast_signed())
 }
 
 #[cfg(test)]
@@ -183,6 +193,9 @@ mod tests {
         assert_eq!(all, other);
         assert_eq!(all.of(1).iter().sum::<i128>(), (1 << 60) * 4);
         assert!(all.of(0).is_empty() && all.of(9).is_empty());
+        for number in [0, -1, 1, i128::MIN, i128::MAX, -(1 << 70)] {
+            assert_eq!(unzigzag(zigzag(number)), number);
+        }
         let mut out = vec![];
         all.write(&mut out);
         assert_eq!(Histograms::read(&mut Reader::new(&out)), Some(all));

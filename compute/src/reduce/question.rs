@@ -126,6 +126,7 @@ pub(super) struct Piece {
     /// Steps of it that are reduced, counted from its first.
     pub(super) steps: Range<u32>,
     /// Numbers of blocks or chunks, increasing.
+    #[serde(with = "super::number_runs")]
     pub(super) rows: Vec<u32>,
     /// Blocks whose stored sums are read.
     pub(super) inside: Vec<InsideRun>,

@@ -22,6 +22,9 @@ use crate::objects::Objects;
 
 use crate::region::loaded::{RegionWeights, weights_failed};
 
+/// What the last tasks of a long question read, bytes before compression: some 40 ms, where to hand out a task takes 5 to 10.
+const LAST_TASK_BYTES: u64 = 32 << 20;
+
 /// Some pieces of a question, as they are handed to a process.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(crate) struct Task {
@@ -43,24 +46,19 @@ impl Task {
         serde_json::from_str(text).map_err(|e| ComputeError::inconsistent("a task", e))
     }
 
-    /// About how much is read for it, bytes before compression.
-    pub(crate) fn cost_bytes(&self) -> u64 {
-        self.pieces.iter().map(Piece::cost_bytes).sum()
-    }
-
-    /// Its pieces as at most `count` tasks, none of them idle, each with about as much to read as the others: steps that lie side by side go
-    /// together. A task then tells of few steps and few ranges of percentiles, each of which is merged once or twice and not once a task, and
-    /// has its share of land and of sea.
-    pub(crate) fn dealt(mut self, count: usize) -> Vec<Self> {
-        let cost = |piece: &Piece| u128::from(piece.cost_bytes().max(1));
-        let all: u128 = self.pieces.iter().map(cost).sum();
+    /// Its pieces as tasks for so many places to work, none of them idle: large ones first, and ever smaller ones, so that all are done at
+    /// about the same time, however quick each is. Steps that lie side by side go together. A task then tells of few steps and few
+    /// ranges of percentiles, each of which is merged once or twice and not once a task, and has its share of land and of sea.
+    pub(crate) fn dealt(mut self, places: usize) -> Vec<Self> {
+        let cost = |piece: &Piece| piece.cost_bytes().max(1);
+        let ends = ends(self.pieces.iter().map(cost).sum(), places.max(1) as u64);
         self.pieces.sort_by_key(|piece| piece.first_step);
         let mut before = 0;
-        let mut tasks: BTreeMap<u128, Vec<Piece>> = BTreeMap::new();
+        let mut tasks: BTreeMap<usize, Vec<Piece>> = BTreeMap::new();
         for piece in self.pieces {
             // By its middle: who has half of it more than the others gets it.
             let own = cost(&piece);
-            let at = (2 * before + own) * count.max(1) as u128 / (2 * all);
+            let at = ends.partition_point(|end| *end <= before + own / 2);
             before += own;
             tasks.entry(at).or_default().push(piece);
         }
@@ -117,6 +115,19 @@ impl Task {
             reduced => reduced.map(Some),
         }
     }
+}
+
+/// Where tasks for so many places end that read so much in all: each takes a part of what is left (Polychronopoulos and Kuck 1987,
+/// doi:10.1109/TC.1987.5009495), half of what would be a place's, and the last ones are equal.
+fn ends(all: u64, places: u64) -> Vec<u64> {
+    let least = LAST_TASK_BYTES.min(all / (2 * places)).max(1);
+    let mut ends = vec![];
+    let mut end = 0;
+    while end < all {
+        end = (end + ((all - end) / (2 * places)).max(least)).min(all);
+        ends.push(end);
+    }
+    ends
 }
 
 /// Takes a row and its values.

@@ -14,14 +14,8 @@ use datafusion::optimizer::AnalyzerRule;
 use crate::functions::ACCUMULATE;
 use crate::reduce::task::Task;
 
-/// Tasks for each place of an executor: who is done early takes one more, and a lost executor loses less.
-const TASKS_A_PLACE: usize = 2;
-/// The same where tasks are long: none of them is waited for at the end while other executors have nothing to do.
-const MOST_TASKS_A_PLACE: usize = 6;
-/// What a task of those reads, bytes before compression: some tenth of a second, where to hand out a task takes 5 ms.
-const TASK_BYTES: u64 = 128 << 20;
-/// Tasks however few executors there are: more of them may come while a query waits.
-const LEAST_TASKS: usize = 8;
+/// Places that tasks are made for however few there are: more executors may come while a query waits.
+const LEAST_PLACES: usize = 4;
 
 /// Cuts the one task of a question into parts of a `UNION ALL`, by the parts that a query is planned in.
 #[derive(Debug)]
@@ -51,13 +45,6 @@ impl AnalyzerRule for Dealing {
     }
 }
 
-/// How many tasks a question is cut into that reads so much.
-fn task_count(cost_bytes: u64, places: usize) -> usize {
-    let by_size = (cost_bytes / TASK_BYTES) as usize;
-    let by_places = by_size.clamp(places * TASKS_A_PLACE, places * MOST_TASKS_A_PLACE);
-    by_places.max(LEAST_TASKS)
-}
-
 /// What the tasks of a question accumulate; none of another plan, or of a question that is one task.
 fn dealt(plan: &LogicalPlan, places: usize) -> Result<Option<LogicalPlan>> {
     match plan {
@@ -72,8 +59,7 @@ fn dealt(plan: &LogicalPlan, places: usize) -> Result<Option<LogicalPlan>> {
             };
             let external = |e: crate::ComputeError| DataFusionError::External(e.into());
             let task = Task::of_text(text).map_err(external)?;
-            let count = task_count(task.cost_bytes(), places);
-            let tasks = task.dealt(count);
+            let tasks = task.dealt(places.max(LEAST_PLACES));
             if tasks.len() < 2 {
                 return Ok(None);
             }
@@ -123,17 +109,4 @@ fn part(of_all: &Projection, text: &str) -> Result<Arc<LogicalPlan>> {
     });
     let part = Projection::try_new(named.collect(), Arc::clone(&of_all.input))?;
     Ok(Arc::new(LogicalPlan::Projection(part)))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn tasks_follow_the_places_and_long_ones_are_cut_finer() {
-        assert_eq!(task_count(1, 1), LEAST_TASKS);
-        assert_eq!(task_count(1, 16), 32);
-        assert_eq!(task_count(40 * TASK_BYTES, 16), 40);
-        assert_eq!(task_count(1 << 40, 16), 96);
-    }
 }
