@@ -98,6 +98,23 @@ impl FieldWindows {
         Ok(parts.into_iter().flatten().collect())
     }
 
+    /// The same of steps that the cube has too; none where a field is gone or damaged: the cube holds the same values.
+    ///
+    /// # Errors
+    /// A store that does not answer.
+    pub(crate) async fn of_sound(
+        &self,
+        fields: Vec<Asked>,
+    ) -> Result<Option<Vec<Found>>, CubeError> {
+        match self.of(fields).await {
+            Err(error) if !error.is_retryable() => {
+                tracing::warn!(%error, "a field cannot be read: the cube is");
+                Ok(None)
+            }
+            found => found.map(Some),
+        }
+    }
+
     async fn one_by_one(&self, fields: Vec<Asked>) -> Result<Vec<Found>, CubeError> {
         let read = |(field, number): Asked| async move {
             let reader = fields::Reader::open(&self.store, &field, Some(&self.grid)).await?;

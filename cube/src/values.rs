@@ -306,7 +306,7 @@ impl Values {
     }
 
     /// Values of some windows of cells of one step, `[row, col]` of each, in the order asked: of its map-major chunks those that
-    /// they touch, each once; where the cube does not have the step, of the field's.
+    /// they touch, each once; of the field's where those are less, or where the cube does not have the step.
     ///
     /// # Errors
     /// As [`Values::cell`].
@@ -323,7 +323,19 @@ impl Values {
         } = &*self.0;
         match places.get(step) {
             None => Err(self.outside(&format!("step {step}"))),
-            Some(Place::Cube { cube, step }) => cubes[*cube].windows(*step, windows).await,
+            Some(Place::Cube {
+                cube,
+                step: in_cube,
+            }) => {
+                let of_fields = FieldWindows::new(store, &manifest.grid, windows);
+                if of_fields.are_quicker() {
+                    let field = manifest.steps[step].field.clone();
+                    if let Some(mut found) = of_fields.of_sound(vec![(field, step)]).await? {
+                        return Ok(found.pop().map(|(_, values)| values).unwrap_or_default());
+                    }
+                }
+                cubes[*cube].windows(*in_cube, windows).await
+            }
             Some(Place::Field) => {
                 let grid = &manifest.grid;
                 for window in windows {
@@ -519,14 +531,10 @@ impl Values {
                 let field = &manifest.steps[steps.start + asked].field;
                 (field.clone(), *asked)
             };
-            match of_fields.of(maps.iter().map(field).collect()).await {
-                Ok(found) => {
-                    put_maps(blocks, &found, steps.len());
-                    return Ok(());
-                }
-                Err(error) if error.is_retryable() => return Err(error),
-                // The cube holds the same values.
-                Err(error) => tracing::warn!(%error, "a field cannot be read: the cube is"),
+            let found = of_fields.of_sound(maps.iter().map(field).collect());
+            if let Some(found) = found.await? {
+                put_maps(blocks, &found, steps.len());
+                return Ok(());
             }
         }
         let read = |(cube, step, asked): (usize, usize, usize)| async move {

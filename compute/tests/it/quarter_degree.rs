@@ -124,14 +124,14 @@ async fn landed(days: usize) -> (tempfile::TempDir, Store, Manifest) {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn of_a_cube_by_maps_a_degree_reads_no_more_than_twice_its_chunks() {
+async fn before_steps_lie_along_time_a_degree_reads_less_than_the_chunks_of_their_maps() {
     let (_folder, store, manifest) = landed(4).await;
-    let (counted, counting) = counted(&store, "cubes/");
+    let (counted, counting) = counted(&store, "");
     let values = cube::Values::of(&counted, &Arc::new(manifest))
         .await
         .unwrap();
     let opened = counting.bytes();
-    // The four corners of the box lie in one chunk of 360 x 480 cells.
+    // The four corners of the box lie in one chunk of 360 x 480 cells of a map, and in one of a field.
     let blocks = [[34, 110], [34, 111]];
     values.blocks(&blocks, 0..4).await.unwrap();
     let read = counting.bytes() - opened;
@@ -139,8 +139,8 @@ async fn of_a_cube_by_maps_a_degree_reads_no_more_than_twice_its_chunks() {
     for key in store.list("cubes/noise/chunks").await.unwrap() {
         chunks += store.size_bytes(&key).await.unwrap();
     }
-    eprintln!("by maps: {read} of {chunks} bytes in chunks; {opened} to open it");
-    assert!(read > chunks / 2 && (read + opened) as f64 <= MOST * chunks as f64);
+    eprintln!("{read} of {chunks} bytes in chunks of maps; {opened} to open it");
+    assert!(read > 0 && 2 * read < chunks);
 }
 
 /// What the engine reads of the cube for a question about a degree, bytes, and what the blocks that it touches hold.

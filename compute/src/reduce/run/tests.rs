@@ -125,7 +125,10 @@ fn tasks_end_together_whatever_the_order_of_pieces_and_however_quick_each_worker
     let whole = done(std::slice::from_ref(&all), &[1.0]);
     for places in [1, 2, 8, 16] {
         let tasks = all.clone().dealt(places);
-        assert!((done(&tasks, &[1.0]) - whole).abs() < 1.0, "nothing is lost");
+        assert!(
+            (done(&tasks, &[1.0]) - whole).abs() < 1.0,
+            "nothing is lost"
+        );
         let even = done(&tasks, &vec![1.0; places]);
         assert!(even * places as f64 <= whole * 1.06, "{places}: {even}");
         let mut speeds = vec![1.0; places];
