@@ -80,6 +80,37 @@ def lagged(first, second, lag):
     return len(a), r, n, p
 
 
+def without(values, gaps):
+    values = values.copy()
+    values[gaps] = np.nan
+    return values
+
+
+def less_their_months(values):
+    """Months from January on."""
+    values = values.copy()
+    for month in range(12):
+        values[month::12] -= np.nanmean(values[month::12])
+    return values
+
+
+def next_step(values):
+    """Autocorrelation at lag 1: the mean product over the pairs there are stands for all."""
+    z = values - np.nanmean(values)
+    return np.nanmean(z[1:] * z[:-1]) * (len(z) - 1) / len(z) / np.nanmean(z * z)
+
+
+def lagged_with_gaps(first, second, lag):
+    together = max(next_step(first) * next_step(second), 0)
+    a, b = (first[: len(first) - lag], second[lag:]) if lag >= 0 else (first[-lag:], second[:lag])
+    here = ~np.isnan(a) & ~np.isnan(b)
+    found = stats.pearsonr(a[here], b[here])
+    n = here.sum() * (1 - together) / (1 + together)
+    r = found.statistic
+    p = 2 * stats.t.sf(abs(r) * np.sqrt((n - 2) / (1 - r * r)), n - 2)
+    return here.sum(), r, n, p
+
+
 x = np.arange(len(SERIES), dtype=float)
 print("normal", 2 * stats.norm.sf(1.0), 2 * stats.norm.sf(3.5), stats.norm.ppf(0.975))
 print("student", 2 * stats.t.sf(2.0, 10), 2 * stats.t.sf(4.2, 3.7), stats.t.ppf(0.975, 10), stats.t.ppf(0.975, 3.7))
@@ -100,6 +131,10 @@ print("correction slow", found.var_s / pymannkendall.original_test(SLOW).var_s)
 waves()
 for lag in (-3, 0, 1, 2):
     print("lag", lag, *lagged(SERIES, OTHER, lag))
+first, second = without(SERIES, [3, 4, 17]), without(OTHER, [0, 9, 17, 28])
+for lag in (-1, 0, 2):
+    print("gaps, lag", lag, *lagged_with_gaps(first, second, lag))
+    print("seasons off, lag", lag, *lagged_with_gaps(less_their_months(first), less_their_months(second), lag))
 test = stats.ttest_ind(A, B, equal_var=False)
 print("welch", np.sqrt(A.var(ddof=1) / len(A) + B.var(ddof=1) / len(B)), test.pvalue)
 print("percentiles", *np.percentile(SORTED, [0, 5, 50, 90, 99, 100]))

@@ -6,31 +6,43 @@ use super::autocorrelation::autocorrelation;
 use super::distribution::student_two_sided;
 
 /// Pairs from which a correlation is one.
-const LEAST_PAIRS: usize = 3;
+pub const LEAST_PAIRS: usize = 3;
+/// How far apart equal values may lie as means of different lengths are rounded, as a share of the largest.
+const ROUNDING: f64 = 1e-12;
 
 /// The correlation of two series at lags from `-max_lag` to `max_lag` steps; the second is read `lag` steps after the first.
 ///
 /// Both hold one value for each of the same steps at equal distances, NaN no data, any unit. Pearson's over the pairs there
 /// are; effective pairs after Bretherton et al. (1999), doi:10.1175/1520-0442(1999)012<1990:TENOSD>2.0.CO;2, equation 31.
 pub fn correlations(first: &[f64], second: &[f64], max_lag: u32) -> Vec<CorrelationRow> {
-    let together = autocorrelation(first, 1) * autocorrelation(second, 1);
+    let together = together(first, second);
     let max_lag = i32::try_from(max_lag).unwrap_or(i32::MAX);
     (-max_lag..=max_lag)
         .map(|lag| at_lag(first, second, lag, together))
         .collect()
 }
 
+/// The same at one lag alone.
+pub fn correlation_at(first: &[f64], second: &[f64], lag: i32) -> CorrelationRow {
+    at_lag(first, second, lag, together(first, second))
+}
+
+/// How both together go with their next steps.
+fn together(first: &[f64], second: &[f64]) -> f64 {
+    autocorrelation(first, 1) * autocorrelation(second, 1)
+}
+
 fn at_lag(first: &[f64], second: &[f64], lag: i32, together: f64) -> CorrelationRow {
     let by = lag.unsigned_abs() as usize;
-    let skipped = |values: &'_ [f64], by: usize| values.get(by..).unwrap_or_default().to_vec();
     let (a, b) = if lag >= 0 {
-        (first.to_vec(), skipped(second, by))
+        (first, second.get(by..).unwrap_or_default())
     } else {
-        (skipped(first, by), second.to_vec())
+        (first.get(by..).unwrap_or_default(), second)
     };
     let pairs: Vec<(f64, f64)> = a
-        .into_iter()
-        .zip(b)
+        .iter()
+        .copied()
+        .zip(b.iter().copied())
         .filter(|(a, b)| !a.is_nan() && !b.is_nan())
         .collect();
     let correlation = pearson(&pairs);
@@ -57,7 +69,8 @@ fn at_lag(first: &[f64], second: &[f64], lag: i32, together: f64) -> Correlation
 /// Pearson's correlation of pairs, none NaN; none with fewer than three, or where one side does not vary.
 fn pearson(pairs: &[(f64, f64)]) -> Option<f64> {
     let n = pairs.len();
-    if n < LEAST_PAIRS {
+    let is_one = n >= LEAST_PAIRS && varies(pairs, |pair| pair.0) && varies(pairs, |pair| pair.1);
+    if !is_one {
         return None;
     }
     let mean = |of: fn(&(f64, f64)) -> f64| pairs.iter().map(of).sum::<f64>() / n as f64;
@@ -71,6 +84,15 @@ fn pearson(pairs: &[(f64, f64)]) -> Option<f64> {
     }
     let spread = (aa * bb).sqrt();
     (spread > 0.0).then(|| (ab / spread).clamp(-1.0, 1.0))
+}
+
+/// Are there two values of one side that differ by more than rounding?
+fn varies(pairs: &[(f64, f64)], of: fn(&(f64, f64)) -> f64) -> bool {
+    let values = pairs.iter().map(of);
+    let [low, high] = values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| {
+        [low.min(value), high.max(value)]
+    });
+    high - low > ROUNDING * low.abs().max(high.abs())
 }
 
 #[cfg(test)]

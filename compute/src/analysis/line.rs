@@ -69,22 +69,48 @@ impl Line {
     }
 }
 
-/// Values with NaN where steps are missing, so that what follows a gap is not taken for the next step: all that a line lacks,
-/// one for each gap where there is no line.
+/// Values with NaN where steps are missing: those of [`Holes`].
 ///
 /// `periods` are in the order of time, `values` beside them, any unit.
 pub fn with_holes(periods: &[Period], values: &[f64]) -> Vec<f64> {
-    if let Some(line) = Line::of(periods) {
-        return line.spread(values);
-    }
-    let mut with_holes = Vec::with_capacity(2 * values.len());
-    for (index, value) in values.iter().enumerate() {
-        if index > 0 && periods[index - 1].end != periods[index].start {
-            with_holes.push(f64::NAN);
+    Holes::between(periods).spread(values)
+}
+
+/// Where steps are missing, so that what follows a gap is not taken for the next step: all that a line lacks, one for each gap
+/// where there is no line. Found once for all series over the same steps.
+#[derive(Debug)]
+pub enum Holes {
+    /// The periods lie on a line.
+    Line(Line),
+    /// They lie on none: does something lie between each and the one before?
+    Apart(Vec<bool>),
+}
+
+impl Holes {
+    /// Those between some periods in the order of time.
+    pub fn between(periods: &[Period]) -> Self {
+        if let Some(line) = Line::of(periods) {
+            return Self::Line(line);
         }
-        with_holes.push(*value);
+        let is_apart = |index: usize| index > 0 && periods[index - 1].end != periods[index].start;
+        Self::Apart((0..periods.len()).map(is_apart).collect())
     }
-    with_holes
+
+    /// Values of the periods in their order, NaN where steps are missing. Any unit.
+    pub fn spread(&self, values: &[f64]) -> Vec<f64> {
+        let apart = match self {
+            Self::Line(line) => return line.spread(values),
+            Self::Apart(apart) => apart,
+        };
+        let mut with_holes = Vec::with_capacity(2 * values.len());
+        for (value, is_apart) in values.iter().zip(apart) {
+            if *is_apart {
+                with_holes.push(f64::NAN);
+            }
+            with_holes.push(*value);
+        }
+        with_holes
+    }
 }
 
 fn is_bin(step: TimeStep, period: Period) -> bool {

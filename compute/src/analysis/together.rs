@@ -5,15 +5,15 @@ use contract::analysis::{
     CalendarBins, Correlation, CorrelationQuery, Difference, DifferenceSide, SeriesQuery,
 };
 use contract::statistics::MinCoverage;
-use contract::time::{Period, TimeStep};
+use contract::time::TimeStep;
 use futures::future::BoxFuture;
 
 use super::climatology::deseasonalised;
+use super::common_steps::{CommonSteps, Covered};
 use super::correlation::correlations;
-use super::line::{Line, with_holes};
 use super::mean_difference::{MeanOverTime, mean_over_time, welch};
 use super::read::{self, ReadSeries, Version};
-use super::timeline::{bins_over, longest_s, means_over, no_shorter};
+use super::timeline::{longest_s, means_over};
 use crate::{ComputeError, Engine};
 
 /// Years from which the mean of a calendar month is more than its one value.
@@ -34,23 +34,13 @@ pub fn correlation<'a>(
         let all = MinCoverage::default();
         let a = read::series(engine, first, &query.series, all).await?;
         let b = read::series(engine, second, &other, all).await?;
-        let (bins, mut values) = on_common_bins(&a, &b, query.step)?;
-        if query.max_lag > 0 && Line::of(&bins).is_none() {
-            let reason = "gaps lie between the steps of both, whose lengths or distances are unequal: ask for lag 0, or for \
-                          steps of the calendar";
-            return Err(ContractError::invalid("lag", &query.max_lag.to_string(), reason).into());
-        }
+        let mut common = CommonSteps::of([covered(&a), covered(&b)], query.step)?;
+        common.check_lag(query.max_lag)?;
         if query.deseasonalise {
-            let step_s = longest_s(&bins);
-            if step_s > CalendarBins::Month.longest_step_s() {
-                let reason = "seasons can be taken off steps of months or shorter ones";
-                return Err(ContractError::invalid("step", query.step.as_str(), reason).into());
-            }
-            values = values.map(|values| deseasonalised(&bins, &values));
+            common = common.without_seasons()?;
         }
-        // Steps that both lack; all are there where they lie on a line.
-        values = values.map(|values| with_holes(&bins, &values));
-        let rows = correlations(&values[0], &values[1], query.max_lag);
+        let [first, second] = common.beside([&a.values, &b.values]);
+        let rows = correlations(&first, &second, query.max_lag);
         let strongest = rows
             .iter()
             .filter_map(|row| Some((row.lag_steps, row.correlation?.abs())))
@@ -72,8 +62,8 @@ pub fn correlation<'a>(
             place: a.place,
             step: query.step,
             deseasonalised: query.deseasonalise,
-            start: bins[0].start,
-            end: bins[bins.len() - 1].end,
+            start: common.extent().start,
+            end: common.extent().end,
             notes,
             rows,
             strongest_lag_steps: strongest.map(|(lag, _)| lag),
@@ -81,63 +71,12 @@ pub fn correlation<'a>(
     })
 }
 
-/// Two series on the bins that both cover, at least one. Native steps that one has, or that both lack, stay in their places
-/// between those of both, NaN where a series lacks them; those of both alone where steps lie on no line.
-fn on_common_bins(
-    a: &ReadSeries,
-    b: &ReadSeries,
-    step: TimeStep,
-) -> Result<(Vec<Period>, [Vec<f64>; 2]), ContractError> {
-    if step == TimeStep::Total {
-        let reason = "one value does not vary: ask for shorter ones";
-        return Err(ContractError::invalid("step", step.as_str(), reason));
+/// What a series covers.
+fn covered(series: &ReadSeries) -> Covered<'_> {
+    Covered {
+        product: &series.cited.product,
+        periods: &series.periods,
     }
-    for series in [a, b] {
-        if no_shorter(&series.periods, step) != step {
-            let product = &series.cited.product;
-            let reason =
-                format!("the steps of {product} are longer: ask for longer ones or native");
-            return Err(ContractError::invalid("step", step.as_str(), reason));
-        }
-    }
-    let (bins_a, bins_b) = (bins_over(&a.periods, step), bins_over(&b.periods, step));
-    let in_both = |bin: &&Period| bins_b.binary_search(bin).is_ok();
-    let common: Vec<Period> = bins_a.iter().filter(in_both).copied().collect();
-    if common.is_empty() {
-        let covers =
-            |series: &ReadSeries| format!("{} covers {}", series.cited.product, series.extent());
-        let reason = format!("no step is common to both: {}, {}", covers(a), covers(b));
-        return Err(ContractError::invalid("step", step.as_str(), reason));
-    }
-    let bins = match step {
-        TimeStep::Native => on_line(&bins_a, &bins_b, common),
-        _ => common,
-    };
-    let on_bins = |series: &ReadSeries| -> Vec<f64> {
-        let (own, means) = means_over(&series.periods, &series.values, step);
-        let at = |bin: &Period| {
-            own.binary_search(bin)
-                .map_or(f64::NAN, |index| means[index])
-        };
-        bins.iter().map(at).collect()
-    };
-    let values = [on_bins(a), on_bins(b)];
-    Ok((bins, values))
-}
-
-/// All steps from the first of those that two series have in common to the last, of either and of none; `common` where they
-/// lie on no line.
-fn on_line(a: &[Period], b: &[Period], common: Vec<Period>) -> Vec<Period> {
-    let (Some(first), Some(last)) = (common.first(), common.last()) else {
-        return common;
-    };
-    let is_between = |step: &&Period| *first <= **step && **step <= *last;
-    let both = a.iter().chain(b).filter(is_between);
-    let mut steps: Vec<Period> = both.copied().collect();
-    steps.sort_unstable();
-    steps.dedup();
-    let line = Line::of(&steps).or_else(|| Line::of(&common));
-    line.map_or(common, |line| line.steps)
 }
 
 /// The mean over time of one version of a product less that of another version, product or period.

@@ -69,3 +69,67 @@ fn what_follows_is_found_at_its_lag_and_what_does_not_vary_has_none() {
     );
     assert!(correlations(&[], &[], 1).iter().all(|row| row.count == 0));
 }
+
+/// `tests/reference/series_statistics.py`.
+#[test]
+fn correlations_over_gaps_are_those_of_an_independent_library() {
+    let without = |mut values: [f64; 30], gaps: &[usize]| {
+        for at in gaps {
+            values[*at] = f64::NAN;
+        }
+        values
+    };
+    let first = without(SERIES, &[3, 4, 17]);
+    let second = without(OTHER, &[0, 9, 17, 28]);
+    for (lag, count, r, effective, p) in [
+        (
+            -1,
+            22,
+            0.323_484_255_277_781_24,
+            10.261_016_805_924_697,
+            0.353_708_562_168_282_17,
+        ),
+        (
+            0,
+            24,
+            0.744_891_889_190_348,
+            11.193_836_515_554_215,
+            0.007_816_738_755_573_84,
+        ),
+        (
+            2,
+            22,
+            0.431_137_595_882_096_7,
+            10.261_016_805_924_697,
+            0.205_753_194_848_065_8,
+        ),
+    ] {
+        let row = correlation_at(&first, &second, lag);
+        assert_eq!((row.lag_steps, row.count), (lag, count));
+        near(row.correlation.unwrap(), r, 1e-12);
+        near(row.effective_count.unwrap(), effective, 1e-12);
+        near(row.p_value.unwrap(), p, 1e-8);
+        let all = correlations(&first, &second, 2);
+        assert_eq!(all[(lag + 2) as usize], row);
+    }
+}
+
+/// Thirty times a tenth is not three: the mean of equal values may lie beside them by rounding.
+#[test]
+fn equal_values_have_no_correlation_whatever_they_are() {
+    let most = 0.1f64.next_up();
+    let rounded: Vec<f64> = (0..30)
+        .map(|at| if at % 3 == 0 { most } else { 0.1 })
+        .collect();
+    for equal in [vec![0.1; 30], vec![-1.7; 30], vec![0.0; 30], rounded] {
+        assert_eq!(correlation_at(&SERIES, &equal, 0).correlation, None);
+        assert_eq!(correlation_at(&equal, &SERIES, 1).p_value, None);
+    }
+    // What varies by little varies.
+    let little: Vec<f64> = SERIES.iter().map(|value| 1e3 + 1e-6 * value).collect();
+    near(
+        correlation_at(&SERIES, &little, 0).correlation.unwrap(),
+        1.0,
+        1e-6,
+    );
+}
