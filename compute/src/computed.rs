@@ -376,7 +376,11 @@ fn check(job: &Job) -> Result<(), ComputeError> {
 fn fits_what_is_there(latest: &Manifest, job: &Job) -> Result<(), ComputeError> {
     let refused = |reason| Err(ComputeError::Expression { reason });
     let product = &latest.product;
-    if latest.computed.is_none() {
+    if !latest
+        .computed
+        .as_ref()
+        .is_some_and(|it| it.how.is_by_step())
+    {
         return refused(format!(
             "{product} is there and was not computed; give another name"
         ));
@@ -434,6 +438,7 @@ fn citation(how: &Computation, inputs: &[Input]) -> String {
             method,
             min_coverage,
         } => format!("Regridded ({method}, cells covered by {min_coverage} at least)"),
+        Computation::Correlation { .. } => "Correlated".to_owned(),
     };
     format!("{what}; {}", inputs.join("; "))
 }

@@ -1,10 +1,11 @@
 //! Products computed from others: a product of fluxes in, a product of the carbon given off since a chosen start out; any
-//! product in, a statistic of each of its cells out.
+//! product in, a statistic of each of its cells out; two in, how they go together in each cell out.
 
 mod at_cell;
 mod carried;
 mod derivation;
 pub(crate) mod exact;
+mod made_from;
 mod prior;
 mod source;
 mod statistic;
@@ -23,6 +24,7 @@ use crate::workshop::Workshop;
 use crate::{ComputeError, Engine, catalogue};
 pub(crate) use at_cell::counts_at_cell;
 use derivation::Derivation;
+use made_from::is_from_newer;
 use source::{SourceStep, steps_since};
 pub use statistic::{derive_statistic, derive_statistics};
 
@@ -100,7 +102,7 @@ async fn derive(
 ) -> Result<Manifest, ComputeError> {
     let workshop = Workshop::of(engine.store());
     let derived = accumulated((engine, workshop), source, steps, prior, progress).await?;
-    commit(engine, source, derived).await
+    commit(engine, derived).await
 }
 
 /// Computes and stores everything but the manifest, which is returned with number 0.
@@ -193,12 +195,8 @@ fn of_all(done_steps: usize, steps: &[SourceStep<'_>]) -> DeriveProgress {
 }
 
 /// Publishes the manifest under the next free number, and brings its cube there, unless another writer published the same derivation meanwhile, or
-/// one of a newer version of the source.
-async fn commit(
-    engine: &Engine,
-    source: &Manifest,
-    mut derived: Manifest,
-) -> Result<Manifest, ComputeError> {
+/// one of newer versions of what it is made from.
+async fn commit(engine: &Engine, mut derived: Manifest) -> Result<Manifest, ComputeError> {
     let mut attempt = 1;
     loop {
         let latest = manifests::latest(engine.store(), &derived.product).await?;
@@ -206,7 +204,7 @@ async fn commit(
             manifests::settle(engine.store(), latest, &mut derived).await?;
         }
         let number = latest.as_ref().map_or(1, |latest| latest.number + 1);
-        if let Some(latest) = latest.filter(|latest| is_no_older(latest, source, &derived)) {
+        if let Some(latest) = latest.filter(|latest| is_no_older(latest, &derived)) {
             cube::keep_up(engine.store(), &latest).await;
             return Ok(latest);
         }
@@ -225,16 +223,14 @@ async fn commit(
     }
 }
 
-/// Is it what was derived, or something derived from a newer version of the source?
-fn is_no_older(latest: &Manifest, source: &Manifest, derived: &Manifest) -> bool {
-    let derived_from = latest.derived_from.as_ref();
-    let is_newer = derived_from.is_some_and(|id| id.number > source.number);
+/// Is it what was derived, or something derived from newer versions?
+fn is_no_older(latest: &Manifest, derived: &Manifest) -> bool {
     let same = Manifest {
         number: latest.number,
         schema: latest.schema,
         ..derived.clone()
     };
-    is_newer || *latest == same
+    is_from_newer(latest, derived) || *latest == same
 }
 
 #[cfg(test)]

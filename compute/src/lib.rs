@@ -33,6 +33,7 @@ mod retry_store;
 mod scan;
 pub mod service;
 mod session;
+mod shared_grid;
 pub mod sql;
 mod standalone;
 mod state;

@@ -9,6 +9,7 @@ mod difference;
 mod extremes;
 mod hovmoller;
 mod map;
+mod map_correlation;
 mod season;
 mod trend;
 mod wishes;
@@ -35,6 +36,7 @@ pub use difference::{Difference, DifferenceSide};
 pub use extremes::{Extreme, Extremes, Percentile};
 pub use hovmoller::{Along, Hovmoller, HovmollerBand, HovmollerQuery, HovmollerRow};
 pub use map::{MapOptions, MapStatistic};
+pub use map_correlation::MapCorrelation;
 pub use season::{Harmonic, Season};
 pub use trend::{LeastSquaresTrend, MannKendall, TheilSenTrend, Trend, TrendValue};
 pub use wishes::{

@@ -237,6 +237,14 @@ mod tests {
     }
 
     #[test]
+    fn correlations_have_the_colours_of_differences_from_less_to_more_than_none() {
+        let plain = Quantity::open("correlation", "1", "Correlation").unwrap();
+        let drawn = TransferFunction::default_for(plain.over([-1.0, 1.0]).unwrap());
+        assert_eq!((drawn.low, drawn.high), (-1.0, 1.0));
+        assert!(drawn.palette.is_diverging());
+    }
+
+    #[test]
     fn the_middle_of_a_diverging_palette_is_no_flux() {
         let tf = TransferFunction::default_for(Quantity::CarbonFlux);
         assert_eq!(

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::ContractError;
 use crate::manifest::ManifestId;
-use crate::time::TimeMs;
+use crate::time::{TimeMs, TimeStep};
 
 /// A computation and what it read.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -25,7 +25,7 @@ pub struct Computed {
     pub to: Option<TimeMs>,
 }
 
-/// What is done in every cell of every step.
+/// What is done in every cell, of every step or over all of them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Computation {
@@ -41,6 +41,29 @@ pub enum Computation {
         /// Least share of a cell that must be covered by data, 0 to 1.
         min_coverage: f64,
     },
+    /// How the two inputs go together over time: one step of all of theirs.
+    Correlation {
+        /// What of it.
+        statistic: CorrelationStatistic,
+        /// Steps that the second is read after the first.
+        lag_steps: i32,
+        /// Means that it is made of.
+        step: TimeStep,
+        /// Was the mean of each calendar month taken off both first?
+        deseasonalised: bool,
+        /// Share of the pairs that there could be that a cell must have, percent.
+        least_percent: u8,
+    },
+}
+
+impl Computation {
+    /// Is a step of the result made of one step of each input, so that it is computed again when one changes?
+    pub fn is_by_step(&self) -> bool {
+        match self {
+            Self::Expression { .. } | Self::Regrid { .. } => true,
+            Self::Correlation { .. } => false,
+        }
+    }
 }
 
 /// How values are brought from one grid to another.
@@ -79,6 +102,32 @@ impl FromStr for Regridding {
             let valid = "use nearest, bilinear or conservative";
             ContractError::invalid("method of regridding", s, valid)
         })
+    }
+}
+
+/// What is said of the correlation of two products in a cell: a number of what is said of two series.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum CorrelationStatistic {
+    /// Pearson's.
+    Coefficient,
+    /// Chance of one as far from none where there is none, by the effective pairs.
+    PValue,
+    /// Pairs of values.
+    Pairs,
+    /// Pairs that are worth one of their own, as autocorrelation leaves them.
+    EffectivePairs,
+}
+
+impl CorrelationStatistic {
+    /// Name on the command line.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Coefficient => "correlation",
+            Self::PValue => "correlation-p-value",
+            Self::Pairs => "correlation-pairs",
+            Self::EffectivePairs => "correlation-effective-pairs",
+        }
     }
 }
 
@@ -148,6 +197,10 @@ mod tests {
         let json = r#"{"how":{"kind":"regrid","method":"conservative","min_coverage":0.5},"inputs":[{"name":"p","manifest":"p@1-00000000"}]}"#;
         let computed: Computed = serde_json::from_str(json).unwrap();
         assert_eq!(serde_json::to_string(&computed).unwrap(), json);
+        let json = r#"{"how":{"kind":"correlation","statistic":"p_value","lag_steps":-2,"step":"month","deseasonalised":true,"least_percent":50},"inputs":[{"name":"first","manifest":"p@1-00000000"},{"name":"second","manifest":"q@2-00000000"}],"from":"2001-01-01T00:00:00Z"}"#;
+        let computed: Computed = serde_json::from_str(json).unwrap();
+        assert_eq!(serde_json::to_string(&computed).unwrap(), json);
+        assert!(!computed.how.is_by_step());
     }
 
     #[test]

@@ -21,7 +21,8 @@ pub(super) async fn of(store: &Store, product: &ProductId) -> Result<Vec<Request
 
 /// The request that a computed product was made by.
 fn again(manifest: Manifest) -> Option<Request> {
-    let computed = manifest.computed?;
+    // What is of all steps together waits until it is asked for.
+    let computed = manifest.computed.filter(|it| it.how.is_by_step())?;
     let input = |input: &contract::computed::ComputedInput| RequestedInput {
         name: input.name.clone(),
         product: input.manifest.product.clone(),

@@ -54,6 +54,12 @@ impl Maker {
                 regridder: Regridder::new(&job.grid, &job.target_grid, *method),
                 min_coverage: *min_coverage,
             },
+            Computation::Correlation { .. } => {
+                let reason = "a correlation is of all steps together: fluxglobe derive statistic";
+                return Err(ComputeError::Expression {
+                    reason: reason.to_owned(),
+                });
+            }
         })
     }
 }

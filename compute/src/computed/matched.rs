@@ -1,6 +1,6 @@
 //! Steps of the inputs that belong together: periods matched, grids compared, and a refusal that says what to write.
 
-use contract::computed::{Computation, Matching, Regridding};
+use contract::computed::{Computation, Matching};
 use contract::digest::Digest;
 use contract::grid::Grid;
 use contract::key::ObjectKey;
@@ -8,7 +8,7 @@ use contract::manifest::{Manifest, Step};
 use contract::quantity::Quantity;
 use contract::time::{Period, TimeMs};
 
-use crate::ComputeError;
+use crate::{ComputeError, shared_grid};
 
 /// An input as it is read.
 #[derive(Debug, Clone, PartialEq)]
@@ -49,42 +49,9 @@ pub(super) fn shared_grid(inputs: &[Input]) -> Result<Grid, ComputeError> {
         return Err(refused("it names no product".to_owned()));
     };
     for other in rest {
-        if !is_same(&first.manifest.grid, &other.manifest.grid) {
-            let (own, others) = (&first.manifest.product, &other.manifest.product);
-            return Err(refused(format!(
-                "{own} is on {}, {others} on {}: bring one to the grid of the other first, such as \
-                 fluxglobe derive regrid --product {others} --like {own} --method {}",
-                in_words(&first.manifest.grid),
-                in_words(&other.manifest.grid),
-                Regridding::Conservative,
-            )));
-        }
+        shared_grid::check(&first.manifest, &other.manifest)?;
     }
     Ok(first.manifest.grid)
-}
-
-/// Are two grids the same but for the noise of their axes?
-fn is_same(a: &Grid, b: &Grid) -> bool {
-    /// Share of a cell: axes of files are written with five digits and more.
-    const SLACK_CELLS: f64 = 1e-3;
-    let near = |a: f64, b: f64, step: f64| (a - b).abs() < SLACK_CELLS * step;
-    let far = (
-        f64::from(a.rows) * a.dlat_deg,
-        f64::from(a.cols) * a.dlon_deg,
-    );
-    (a.rows, a.cols) == (b.rows, b.cols)
-        && near(a.north_deg, b.north_deg, a.dlat_deg)
-        && near(a.west_deg, b.west_deg, a.dlon_deg)
-        && near(far.0, f64::from(b.rows) * b.dlat_deg, a.dlat_deg)
-        && near(far.1, f64::from(b.cols) * b.dlon_deg, a.dlon_deg)
-}
-
-fn in_words(grid: &Grid) -> String {
-    let [west, south, east, north] = grid.shown_bounds_deg();
-    format!(
-        "{} x {} cells over {west},{south},{east},{north}",
-        grid.rows, grid.cols
-    )
 }
 
 /// Partial pressure and fugacity of CO2 are both in Pa and differ by 0.4 %, a tenth of what lies between water and air: they

@@ -1,11 +1,13 @@
-//! Statistics of every cell: a product and a statistic in; a product of its own out, landed like any other.
+//! Statistics of every cell: a product, or two, and a statistic in; a product of its own out, landed like any other.
 
 mod anomalies;
 mod blocks;
 mod cells;
 mod landed;
+mod pairs;
 mod plan;
 mod quantity;
+mod sources;
 mod wanted;
 
 use contract::ContractError;
@@ -16,10 +18,12 @@ use contract::region::AskedRegion;
 use futures::future::BoxFuture;
 use storage::manifests;
 
+use super::made_from::made_from;
 use super::{Progress, commit};
-use crate::{ComputeError, Engine, catalogue};
+use crate::{ComputeError, Engine};
 use landed::{Landing, computed};
 use plan::Plan;
+use sources::{Sources, SourcesOf};
 use wanted::Wanted;
 
 /// Derives a statistic of each cell of the newest version of a product: [`derive_statistics`] of one.
@@ -42,13 +46,13 @@ pub fn derive_statistic<'a>(
 
 /// Derives statistics of each cell of the newest version of a product, or of those in one region, in their order.
 ///
-/// Cells are read once for all of them, in blocks over all time, as many at once as fit an eighth of the engine's memory, and computed on all processors:
-/// the same bits whatever their number. Where the newest version of a statistic was derived from the same steps in the same way, it
-/// is returned as it is. [`super::derived`] is the event to tell of each, after its manifest.
+/// Correlations are with the newest version of another product. Cells of both are read once for all of them, in blocks over all time,
+/// as many at once as fit an eighth of the engine's memory, and computed on all processors: the same bits whatever their number. Where
+/// the newest version of a statistic was derived from the same steps in the same way, it is returned as it is. [`super::derived`] is the event to tell of each, after its manifest.
 ///
 /// # Errors
-/// Steps that one cannot be made of, a target that was not derived from the product, and what reading and writing meet; nothing is
-/// computed before all are looked at.
+/// Steps that one cannot be made of, correlations with several products or one on another grid, a target that was not derived from the
+/// same products, and what reading and writing meet; nothing is computed before all are looked at.
 pub fn derive_statistics<'a>(
     engine: &'a Engine,
     product: &'a ProductId,
@@ -56,24 +60,25 @@ pub fn derive_statistics<'a>(
     progress: &'a Progress<'a>,
 ) -> BoxFuture<'a, Result<Vec<Manifest>, ComputeError>> {
     Box::pin(async move {
-        let source = catalogue::product(engine.store(), product).await?;
-        let wanted = Wanted::of(&source, one_region(options)?)?;
+        let sources = Sources::read(engine, product, options).await?;
+        let wanted = Wanted::of(&sources.first, one_region(options)?)?;
         let mut asked = vec![];
         for one in options {
-            asked.push(Asked::of(engine, &source, one).await?);
+            asked.push(Asked::of(engine, sources.of(one)?, one).await?);
         }
         let is_twice =
-            |one: &Asked| asked.iter().filter(|own| own.target == one.target).count() > 1;
+            |one: &Asked<'_>| asked.iter().filter(|own| own.target == one.target).count() > 1;
         if let Some(twice) = asked.iter().find(|one| is_twice(one)) {
             let reason = "two statistics would become this one product";
             return Err(ContractError::invalid("product", twice.target.as_str(), reason).into());
         }
         let plans = asked.iter().filter(|one| one.there.is_none());
         let plans: Vec<Plan> = plans.map(|one| one.plan.clone()).collect();
-        let found = computed(engine, &source, &plans, &wanted, progress).await?;
+        let found = computed(engine, &sources, &plans, &wanted, progress).await?;
         let mut found = found.into_iter();
         let mut made = vec![];
         for Asked {
+            sources,
             target,
             plan,
             there,
@@ -86,7 +91,7 @@ pub fn derive_statistics<'a>(
             };
             let landing = Landing {
                 engine,
-                source: &source,
+                sources,
                 target: &target,
                 plan: &plan,
                 wanted: &wanted,
@@ -95,7 +100,7 @@ pub fn derive_statistics<'a>(
                 MapStatistic::Anomaly => landing.anomalies(computed, progress).await?,
                 _ => landing.each(computed).await?,
             };
-            made.push(commit(engine, &source, derived).await?);
+            made.push(commit(engine, derived).await?);
         }
         Ok(made)
     })
@@ -115,38 +120,40 @@ fn one_region(options: &[MapOptions]) -> Result<Option<&AskedRegion>, ContractEr
 }
 
 /// A statistic that is asked for.
-struct Asked {
+struct Asked<'a> {
+    sources: SourcesOf<'a>,
     target: ProductId,
     plan: Plan,
     /// Its newest version, if that is what would be derived.
     there: Option<Manifest>,
 }
 
-impl Asked {
+impl<'a> Asked<'a> {
     async fn of(
         engine: &Engine,
-        source: &Manifest,
+        sources: SourcesOf<'a>,
         options: &MapOptions,
     ) -> Result<Self, ComputeError> {
-        let product = &source.product;
-        let target = options.target(product)?;
-        let plan = Plan::of(source, options)?;
+        let target = options.target(&sources.first.product)?;
+        let plan = Plan::of(sources, options)?;
         let mut there = None;
         if let Some(latest) = manifests::latest(engine.store(), &target).await? {
-            let of_it = latest.derived_from.as_ref().map(|from| &from.product);
-            if of_it != Some(product) {
+            let made_from = made_from(&latest).into_iter().map(|from| &from.product);
+            if !made_from.eq(sources.products()) {
                 let reason = format!(
-                    "there is a product of this name that is no statistic of {product}: give another name"
+                    "there is a product of this name that is no statistic of {}: give another name",
+                    sources.in_words()
                 );
                 return Err(ContractError::invalid("product", target.as_str(), reason).into());
             }
-            if plan.is_up_to_date(&latest, source) {
+            if plan.is_up_to_date(&latest, sources.first) {
                 // Whoever published it may have been killed before the cube followed.
                 cube::keep_up(engine.store(), &latest).await;
                 there = Some(latest);
             }
         }
         Ok(Self {
+            sources,
             target,
             plan,
             there,

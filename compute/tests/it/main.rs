@@ -17,6 +17,8 @@ mod co2_flux;
 #[cfg(test)]
 mod computed;
 #[cfg(test)]
+mod correlated;
+#[cfg(test)]
 mod damaged;
 #[cfg(test)]
 mod fixture;

@@ -12,6 +12,18 @@ use crate::time::{TimeMs, TimeStep};
 /// Most steps that one series is moved against the other.
 const MAX_LAG: u32 = 400;
 
+/// May one series be moved so many steps against the other?
+///
+/// # Errors
+/// More than 400.
+pub(super) fn check_lag(steps: u32) -> Result<(), ContractError> {
+    if steps <= MAX_LAG {
+        return Ok(());
+    }
+    let reason = format!("0 to {MAX_LAG} steps");
+    Err(ContractError::invalid("lag", &steps.to_string(), reason))
+}
+
 /// What is asked of two products.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CorrelationQuery {
@@ -33,10 +45,7 @@ impl CorrelationQuery {
     /// # Errors
     /// More than 400.
     pub fn new(series: SeriesQuery, with: ProductId, max_lag: u32) -> Result<Self, ContractError> {
-        if max_lag > MAX_LAG {
-            let reason = format!("0 to {MAX_LAG} steps");
-            return Err(ContractError::invalid("lag", &max_lag.to_string(), reason));
-        }
+        check_lag(max_lag)?;
         Ok(Self {
             series,
             with,

@@ -5,12 +5,13 @@ use std::str::FromStr;
 
 use serde::{Serialize, Serializer};
 
-use super::{BasePeriod, CalendarBins};
+use super::{AnalysisOptions, BasePeriod, CalendarBins, MapCorrelation};
 use crate::ContractError;
+use crate::computed::CorrelationStatistic;
 use crate::product::ProductId;
 use crate::region::{AskedRegion, NamedRegion};
 use crate::statistics::Percentile;
-use crate::time::TimeMs;
+use crate::time::{TimeMs, TimeStep};
 
 /// A statistic over time of each cell by itself.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -49,11 +50,13 @@ pub enum MapStatistic {
     LeastSquaresTrend,
     /// Chance of such a slope where there is none, by an effective number of means that allows for autocorrelation.
     LeastSquaresTrendPValue,
+    /// How it goes together with another product, over means that both have.
+    Correlation(CorrelationStatistic),
 }
 
 impl MapStatistic {
     /// All of them, in the order they are offered; of percentiles the median.
-    pub const ALL: [Self; 17] = [
+    pub const ALL: [Self; 21] = [
         Self::Mean,
         Self::Min,
         Self::Max,
@@ -71,6 +74,10 @@ impl MapStatistic {
         Self::TrendPValue,
         Self::LeastSquaresTrend,
         Self::LeastSquaresTrendPValue,
+        Self::Correlation(CorrelationStatistic::Coefficient),
+        Self::Correlation(CorrelationStatistic::PValue),
+        Self::Correlation(CorrelationStatistic::Pairs),
+        Self::Correlation(CorrelationStatistic::EffectivePairs),
     ];
 
     /// Its name as part of one of a product: `p97-5`.
@@ -98,12 +105,29 @@ impl MapStatistic {
             Self::TrendPValue => "trend-p-value",
             Self::LeastSquaresTrend => "least-squares-trend",
             Self::LeastSquaresTrendPValue => "least-squares-trend-p-value",
+            Self::Correlation(of) => of.as_str(),
         }
     }
 
     /// Is it gathered in months or seasons of the year?
     pub fn has_bins(self) -> bool {
         matches!(self, Self::Climatology | Self::Anomaly)
+    }
+
+    /// Is it of a line through means of the steps of time?
+    pub fn is_trend(self) -> bool {
+        matches!(
+            self,
+            Self::Trend
+                | Self::TrendPValue
+                | Self::LeastSquaresTrend
+                | Self::LeastSquaresTrendPValue
+        )
+    }
+
+    /// Is it one of two products?
+    pub fn is_of_two(self) -> bool {
+        matches!(self, Self::Correlation(_))
     }
 }
 
@@ -161,12 +185,18 @@ pub struct MapOptions {
     pub from: Option<TimeMs>,
     /// First instant after them; the product's end if absent.
     pub to: Option<TimeMs>,
-    /// Share of the time, of a bin's steps or of the months that must hold data for a cell to have a value, percent.
+    /// Share of the time, of a bin's steps or of the pairs that there could be that must hold data for a cell to have a value, percent.
     pub least_percent: u8,
+    /// Means that trends are drawn through and correlations made of.
+    #[serde(skip_serializing_if = "is_usual")]
+    pub step: TimeStep,
+    /// What a correlation is with; absent of everything else.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub correlation: Option<MapCorrelation>,
     /// Where: cells that lie in it, wholly or in part; everywhere if absent.
     #[serde(skip)]
     pub region: Option<AskedRegion>,
-    /// Product that it becomes; `PRODUCT-STATISTIC` if absent, and `-REGION` after it of a named one.
+    /// Product that it becomes; `PRODUCT-STATISTIC` if absent, `-WITH` after it of a correlation, and `-REGION` of a named one.
     #[serde(skip)]
     pub name: Option<ProductId>,
 }
@@ -181,40 +211,110 @@ impl MapOptions {
             from: None,
             to: None,
             least_percent: 50,
+            step: AnalysisOptions::USUAL_STEP,
+            correlation: None,
             region: None,
             name: None,
+        }
+    }
+
+    /// The usual options of a correlation with another product.
+    pub fn of_two(statistic: CorrelationStatistic, correlation: MapCorrelation) -> Self {
+        Self {
+            correlation: Some(correlation),
+            ..Self::new(MapStatistic::Correlation(statistic))
         }
     }
 
     /// The product that the statistic of a product becomes.
     ///
     /// # Errors
-    /// The name would be too long, is the product's own, or is kept for accumulated carbon; a region without a name of its own,
-    /// and none for the product.
+    /// The name would be too long, is that of a product it is made of, or is kept for accumulated carbon; a region without a name of
+    /// its own, and none for the product.
     pub fn target(&self, product: &ProductId) -> Result<ProductId, ContractError> {
         let statistic = self.statistic.word();
+        let with = self.correlation.as_ref().map(|own| &own.with);
+        let of_both = match with {
+            Some(with) => format!("{product}-{statistic}-{with}"),
+            None => format!("{product}-{statistic}"),
+        };
         let name = match (&self.name, &self.region) {
             (Some(name), _) => name.clone(),
-            (None, None) => format!("{product}-{statistic}").parse()?,
+            (None, None) => made_up(&of_both)?,
             (None, Some(asked)) if NamedRegion::find(&asked.name).is_some() => {
-                format!("{product}-{statistic}-{}", asked.name).parse()?
+                made_up(&format!("{of_both}-{}", asked.name))?
             }
             (None, Some(asked)) => {
                 let reason = "a statistic of a region that has no name of its own needs a name for its product: --name";
                 return Err(ContractError::invalid("region", &asked.name, reason));
             }
         };
-        if name == *product || name.as_str().ends_with("-accumulated") {
-            let reason = "a statistic needs a name of its own, which does not end in -accumulated";
+        let is_taken = name == *product || with == Some(&name);
+        if is_taken || name.as_str().ends_with("-accumulated") {
+            let reason =
+                "a statistic needs a name of its own, which does not end in -accumulated: --name";
             return Err(ContractError::invalid("product", name.as_str(), reason));
         }
         Ok(name)
     }
 }
 
+/// A name that was put together.
+fn made_up(name: &str) -> Result<ProductId, ContractError> {
+    name.parse().map_err(|_too_long: ContractError| {
+        let reason =
+            "it would be longer than the 64 letters that a name may have: give another, --name";
+        ContractError::invalid("product", name, reason)
+    })
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it so")]
+fn is_usual(step: &TimeStep) -> bool {
+    *step == AnalysisOptions::USUAL_STEP
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn correlations_are_named_by_both_products() {
+        let product: ProductId = "sst".parse().unwrap();
+        let mut with = MapCorrelation::new("wind".parse().unwrap());
+        let of =
+            |with: &MapCorrelation| MapOptions::of_two(CorrelationStatistic::PValue, with.clone());
+        let name = of(&with).target(&product).unwrap();
+        assert_eq!(name.as_str(), "sst-correlation-p-value-wind");
+        let in_region = MapOptions {
+            region: Some("equatorial-pacific".parse().unwrap()),
+            ..of(&with)
+        };
+        let name = in_region.target(&product).unwrap();
+        assert_eq!(
+            name.as_str(),
+            "sst-correlation-p-value-wind-equatorial-pacific"
+        );
+        let taken = MapOptions {
+            name: Some(with.with.clone()),
+            ..of(&with)
+        };
+        assert!(taken.target(&product).is_err());
+        let long = MapCorrelation::new("w".repeat(60).parse().unwrap());
+        let refused = of(&long).target(&product).unwrap_err();
+        assert!(refused.to_string().contains("--name"), "{refused}");
+        with.lag_steps = -400;
+        assert!(with.check().is_ok());
+        with.lag_steps = -401;
+        assert!(with.check().is_err());
+    }
+
+    /// Names of products that are there hang on these bytes.
+    #[test]
+    fn options_that_are_as_usual_are_written_as_they_always_were() {
+        let json = serde_json::to_string(&MapOptions::new(MapStatistic::Trend)).unwrap();
+        let always = r#"{"statistic":"trend","base":null,"bins":"month","from":null,"to":null,"least_percent":50}"#;
+        assert_eq!(json, always);
+    }
 
     #[test]
     fn statistics_have_names_and_so_have_their_products() {

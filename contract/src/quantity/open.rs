@@ -96,10 +96,10 @@ impl OpenQuantity {
         &self.0.shown_unit
     }
 
-    /// Are its values differences, on either side of none? Anomalies and trends are.
+    /// Do its values lie on either side of none? Those of anomalies, trends and correlations do.
     pub fn is_difference(self) -> bool {
         let name = &self.words().name;
-        name.ends_with("_anomaly") || name.ends_with("_trend")
+        name == "correlation" || name.ends_with("_anomaly") || name.ends_with("_trend")
     }
 
     /// Is it the same but for title and range?

@@ -1,14 +1,35 @@
 //! Options of statistics that become products.
 
-use anyhow::Result;
+use anyhow::{Result, bail};
 use clap::Args;
-use contract::analysis::{BasePeriod, CalendarBins, MapOptions, MapStatistic};
+use contract::analysis::{
+    AnalysisOptions, BasePeriod, CalendarBins, MapCorrelation, MapOptions, MapStatistic,
+};
 use contract::product::ProductId;
 use contract::region::AskedRegion;
-use contract::time::TimeMs;
+use contract::time::{TimeMs, TimeStep};
+
+use super::steps::STEPS;
+
+/// What the long help ends with.
+const CORRELATIONS: &str = "\
+How two products go together in each cell, over the months that both have:
+
+  fluxglobe derive statistic --product sst --with wind --deseasonalise \\
+    --statistic correlation,correlation-p-value,correlation-pairs
+
+makes sst-correlation-wind and so on, each cell what `fluxglobe stats correlate --at` says of it:
+Pearson's r, -1 to 1; p by effective pairs, which allow for autocorrelation (Bretherton et al.
+1999); pairs of months, each of which holds data in half of its time. Seasons alone make most
+pairs of products go together: --deseasonalise takes them off first. With --lag 2 the second is
+read two months after the first, with --lag=-2 before it; give maps of several lags a --name each.
+Both lie on one grid: `fluxglobe derive regrid` brings one to that of the other. What a map was
+made from, both versions, is in its manifest (`computed`); asked again it is made anew if there is
+a newer version of either, and by itself never.";
 
 /// `fluxglobe derive statistic`.
 #[derive(Debug, Args)]
+#[command(after_long_help = CORRELATIONS)]
 pub(crate) struct DeriveStatistic {
     /// Product, of any quantity.
     #[arg(long)]
@@ -16,9 +37,28 @@ pub(crate) struct DeriveStatistic {
     /// One or more, separated by commas; the product is read once for all: mean, min, max, median, p97.5 and the like,
     /// min-time and max-time (when), count and coverage (steps and share of the time with data), spread (standard deviation),
     /// climatology (a step a month or season), anomaly (every step less the climatology), amplitude and phase of the year's wave,
-    /// trend (Theil-Sen), trend-p-value (Mann-Kendall, Hamed-Rao), least-squares-trend, least-squares-trend-p-value.
+    /// trend (Theil-Sen), trend-p-value (Mann-Kendall, Hamed-Rao), least-squares-trend, least-squares-trend-p-value; together with
+    /// the product --with: correlation, correlation-p-value, correlation-pairs, correlation-effective-pairs.
     #[arg(long, value_name = "NAME,...", value_delimiter = ',', required = true)]
     pub(crate) statistic: Vec<MapStatistic>,
+    /// The second product of correlations, on the same grid.
+    #[arg(long, value_name = "PRODUCT")]
+    pub(crate) with: Option<ProductId>,
+    /// Steps that the second product is read after the first, at most 400; before it below zero. None if absent.
+    #[arg(
+        long,
+        value_name = "STEPS",
+        requires = "with",
+        allow_negative_numbers = true
+    )]
+    pub(crate) lag: Option<i32>,
+    /// Take the mean of each calendar month off both products of a correlation first: two with seasons always go together.
+    #[arg(long, requires = "with")]
+    pub(crate) deseasonalise: bool,
+    /// Means that trends are drawn through and correlations made of. Of trends steps as they are where those are longer; `native`
+    /// correlations need the same periods of both. Months if absent.
+    #[arg(long, visible_alias = "step", value_name = STEPS)]
+    pub(crate) trend_step: Option<TimeStep>,
     /// Only the cells that lie in it, wholly or in part: `global`, a named region, a box WEST,SOUTH,EAST,NORTH, a GeoJSON or WKT
     /// file, the text of one, or PRODUCT:CODE of a landed mask. Every cell if absent.
     #[arg(long, allow_hyphen_values = true)]
@@ -35,11 +75,11 @@ pub(crate) struct DeriveStatistic {
     /// First instant after them. The product's end if absent.
     #[arg(long)]
     pub(crate) to: Option<TimeMs>,
-    /// Share of the time, or of a bin's steps, that must hold data for a cell to have a value, percent.
+    /// Share of the time, of a bin's steps or of all pairs of steps that must hold data for a cell to have a value, percent.
     #[arg(long, default_value_t = 50, value_name = "PERCENT", value_parser = clap::value_parser!(u8).range(0..=100))]
     pub(crate) least_percent: u8,
     /// Product that it becomes; of several statistics what their names begin with: NAME-STATISTIC. PRODUCT-STATISTIC if absent,
-    /// and -REGION after it where that is a named one.
+    /// PRODUCT-STATISTIC-WITH of correlations, and -REGION after it where that is a named one.
     #[arg(long, value_name = "PRODUCT")]
     pub(crate) name: Option<ProductId>,
     #[command(flatten, next_help_heading = "Kafka")]
@@ -50,8 +90,33 @@ impl DeriveStatistic {
     /// What is derived, in a region or everywhere.
     ///
     /// # Errors
-    /// A name that would be too long.
+    /// A name that would be too long; a correlation without a second product, or one that nothing is correlated with.
     pub(crate) fn asked(&self, region: Option<&AskedRegion>) -> Result<Vec<MapOptions>> {
+        let correlation = self.with.clone().map(|with| MapCorrelation {
+            lag_steps: self.lag.unwrap_or_default(),
+            deseasonalise: self.deseasonalise,
+            ..MapCorrelation::new(with)
+        });
+        let is_any_of_two = self.statistic.iter().any(|one| one.is_of_two());
+        match &self.with {
+            None if is_any_of_two => {
+                bail!("a correlation is of two products: give the second, --with")
+            }
+            Some(with) if !is_any_of_two => {
+                bail!(
+                    "nothing is made of {with}: --with is for correlations, such as --statistic correlation"
+                );
+            }
+            _ => {}
+        }
+        let has_step = |one: &MapStatistic| one.is_trend() || one.is_of_two();
+        if let Some(step) = self.trend_step
+            && !self.statistic.iter().any(has_step)
+        {
+            bail!(
+                "nothing is made of means of a {step}: --trend-step is for trends and correlations"
+            );
+        }
         let one = |statistic: &MapStatistic| -> Result<MapOptions> {
             let name = match &self.name {
                 Some(name) if self.statistic.len() > 1 => {
@@ -65,11 +130,68 @@ impl DeriveStatistic {
                 from: self.from,
                 to: self.to,
                 least_percent: self.least_percent,
+                step: self
+                    .trend_step
+                    .filter(|_| has_step(statistic))
+                    .unwrap_or(AnalysisOptions::USUAL_STEP),
+                correlation: correlation.clone().filter(|_| statistic.is_of_two()),
                 region: region.cloned(),
                 name,
                 ..MapOptions::new(*statistic)
             })
         };
         self.statistic.iter().map(one).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+
+    #[derive(Debug, Parser)]
+    struct Line {
+        #[command(flatten)]
+        options: DeriveStatistic,
+    }
+
+    fn asked(words: &str) -> Result<Vec<MapOptions>> {
+        let line = ["statistic", "--product", "sst", "--statistic"];
+        let line = line.into_iter().chain(words.split(' '));
+        Line::try_parse_from(line)?.options.asked(None)
+    }
+
+    #[test]
+    fn correlations_have_a_second_product_and_nothing_else_has() {
+        let all =
+            asked("trend,correlation,correlation-pairs --with wind --lag -2 --step year").unwrap();
+        let lags = all
+            .iter()
+            .map(|one| one.correlation.as_ref().map(|with| with.lag_steps));
+        assert_eq!(lags.collect::<Vec<_>>(), [None, Some(-2), Some(-2)]);
+        assert!(all.iter().all(|one| one.step == TimeStep::Year));
+        let mixed = asked("mean,trend --trend-step year").unwrap();
+        assert_eq!(
+            [mixed[0].step, mixed[1].step],
+            [TimeStep::Month, TimeStep::Year]
+        );
+        assert_eq!(asked("trend").unwrap()[0].step, TimeStep::Month);
+        for (words, reason) in [
+            ("correlation", "give the second"),
+            ("mean --with wind", "for correlations"),
+            ("mean --lag 1", "--with"),
+            ("mean --trend-step year", "for trends"),
+            ("mean --deseasonalise", "--with"),
+        ] {
+            let refused = asked(words).unwrap_err().to_string();
+            assert!(refused.contains(reason), "{words}: {refused}");
+        }
+        let named = asked("correlation,correlation-p-value --with wind --name both").unwrap();
+        let names = named
+            .iter()
+            .map(|one| one.target(&"sst".parse().unwrap()).unwrap());
+        let names: Vec<String> = names.map(|name| name.to_string()).collect();
+        assert_eq!(names, ["both-correlation", "both-correlation-p-value"]);
     }
 }

@@ -186,7 +186,9 @@ fn functions() -> Result<()> {
 /// Computes statistics of each cell with a progress bar; at once those that are there already.
 async fn statistic(settings: &Settings, options: &DeriveStatistic) -> Result<()> {
     let store = deployment::store(settings)?;
-    deployment::manifest(&store, &options.product, &settings.data).await?;
+    for product in std::iter::once(&options.product).chain(&options.with) {
+        deployment::manifest(&store, product, &settings.data).await?;
+    }
     let log = listening(settings, &options.kafka).await?;
     let region = match &options.region {
         Some(text) => Some(stored_region(settings, &store, text).await?),

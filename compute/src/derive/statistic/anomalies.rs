@@ -33,7 +33,7 @@ impl Landing<'_> {
         normals: Vec<Vec<f64>>,
         progress: &Progress<'_>,
     ) -> Result<Manifest, ComputeError> {
-        let (plan, source, engine) = (self.plan, self.source, self.engine);
+        let (plan, source, engine) = (self.plan, self.sources.first, self.engine);
         let (grid, factor) = (source.grid, plan.factor);
         let less = Arc::new(Less {
             grid,
@@ -41,7 +41,12 @@ impl Landing<'_> {
             factor,
         });
         let values = engine.values(source, &source.id()).await?;
-        let blocks = Blocks::of(source, self.wanted, engine.memory_bytes());
+        let blocks = Blocks::of(
+            &grid,
+            self.wanted,
+            source.steps.len(),
+            engine.memory_bytes(),
+        );
         let (values, blocks) = (&values, &blocks);
         let read = |steps: Range<usize>| async move {
             let held = blocks.in_run(values, source, steps.clone()).await?;
@@ -84,8 +89,9 @@ impl Landing<'_> {
         run: Arc<Run>,
         less: Arc<Less>,
     ) -> Result<(Step, Found), ComputeError> {
-        let (store, grid) = (self.engine.store(), self.source.grid);
-        let own = &self.source.steps[step];
+        let source = self.sources.first;
+        let (store, grid) = (self.engine.store(), source.grid);
+        let own = &source.steps[step];
         let output = &self.plan.outputs[step - self.plan.first_written];
         let (bin, period) = (self.plan.bins.of(own.period), output.period);
         let field = match run.held {

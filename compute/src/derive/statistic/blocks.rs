@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use contract::chunk::{Window, windows};
+use contract::grid::Grid;
 use contract::manifest::Manifest;
 use cube::{BLOCK_CELLS, Block, RUN_STEPS, Values};
 
@@ -23,7 +24,15 @@ pub(super) struct Cells {
     pub(super) values: Vec<f32>,
 }
 
-/// The blocks of a product's grid, and how many are read at once.
+/// A version whose cells are read.
+pub(super) struct Reading<'a> {
+    pub(super) manifest: &'a Manifest,
+    pub(super) values: Values,
+    /// Steps that are needed: others may be left without data.
+    pub(super) steps: Range<usize>,
+}
+
+/// The blocks of a grid, and how many are read at once.
 pub(super) struct Blocks {
     /// By their numbers, increasing.
     windows: Vec<(u32, Window)>,
@@ -33,15 +42,16 @@ pub(super) struct Blocks {
 }
 
 impl Blocks {
-    /// Those in which some cell is wanted; work may take so much memory.
-    pub(super) fn of(manifest: &Manifest, wanted: &Wanted, memory_bytes: usize) -> Self {
+    /// Those in which some cell is wanted; work may take so much memory, and each cell has so many steps, of all versions that are
+    /// read together.
+    pub(super) fn of(grid: &Grid, wanted: &Wanted, step_count: usize, memory_bytes: usize) -> Self {
         let block_bytes = (BLOCK_CELLS * BLOCK_CELLS) as usize * size_of::<f32>();
         let windows: Vec<(u32, Window)> = (0..)
-            .zip(windows(&manifest.grid, BLOCK_CELLS, BLOCK_CELLS))
-            .filter(|(_, window)| wanted.is_any_of(&manifest.grid, *window))
+            .zip(windows(grid, BLOCK_CELLS, BLOCK_CELLS))
+            .filter(|(_, window)| wanted.is_any_of(grid, *window))
             .collect();
         let run_bytes = windows.len().saturating_mul(block_bytes * RUN_STEPS);
-        let all_bytes = block_bytes * manifest.steps.len().max(1);
+        let all_bytes = block_bytes * step_count.max(1);
         Self {
             is_run_held: run_bytes <= memory_bytes / RUN_SHARE,
             windows,
@@ -55,13 +65,17 @@ impl Blocks {
         (0..all.div_ceil(at_once)).map(move |run| run * at_once..((run + 1) * at_once).min(all))
     }
 
-    /// The cells of a run of blocks at all steps.
+    /// The cells of a run of blocks at all steps; NaN at those that are not needed.
     pub(super) async fn read(
         &self,
-        values: &Values,
-        manifest: &Manifest,
+        reading: &Reading<'_>,
         run: Range<usize>,
     ) -> Result<Cells, ComputeError> {
+        let Reading {
+            manifest,
+            values,
+            steps: needed,
+        } = reading;
         let blocks = &self.windows[run];
         let places = blocks
             .iter()
@@ -73,7 +87,8 @@ impl Blocks {
             values: vec![f32::NAN; places.len() * step_count],
             places,
         };
-        for steps in values.runs() {
+        let is_needed = |steps: &Range<usize>| steps.start < needed.end && needed.start < steps.end;
+        for steps in values.runs().into_iter().filter(is_needed) {
             let found = values.blocks(&asked, steps.clone()).await?;
             let mut first = 0;
             for block in &found {

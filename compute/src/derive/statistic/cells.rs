@@ -1,14 +1,19 @@
-//! Statistics of one cell: its values at all steps in, one value for each step that is written out.
+//! Statistics of one cell: its values at all steps in, those of two products where it is of two; one value for each step that is
+//! written out.
 //!
-//! Several statistics of a cell share what they have in common: a trend, its test and its season are worked out once.
+//! Several statistics of a cell share what they have in common: a trend, its test, its season and its correlation are worked out once.
 
 use std::ops::Range;
 use std::sync::Arc;
 
-use contract::analysis::{CalendarBins, LeastSquaresTrend, MannKendall, MapStatistic, Season};
+use contract::analysis::{
+    CalendarBins, CorrelationRow, LeastSquaresTrend, MannKendall, MapStatistic, Season,
+};
+use contract::computed::CorrelationStatistic;
 use contract::statistics::Percentile;
 use contract::time::{Period, TimeStep};
 
+use super::pairs::Pairs;
 use super::plan::Plan;
 use crate::analysis::climatology::spread;
 use crate::analysis::harmonics::season;
@@ -18,37 +23,55 @@ use crate::reduce::least_part;
 const DAY_MS: f64 = 86_400_000.0;
 
 /// Statistics of a cell, each over its own steps, what they need made once.
-pub(super) struct OfCells(Vec<OfCell>);
+pub(super) struct OfCells {
+    each: Vec<OfCell>,
+    /// What correlations are made by.
+    pairs: Vec<Pairs>,
+}
 
 impl OfCells {
     /// Those of some plans over the steps of these periods.
     pub(super) fn new(plans: &[Plan], periods: &[Period]) -> Self {
         let mut each: Vec<OfCell> = vec![];
+        let mut pairs: Vec<Pairs> = vec![];
         for plan in plans {
             let mut own = OfCell::new(plan, periods);
-            if is_trend(own.statistic) {
-                let mut same = each.iter().filter(|other| other.read == own.read);
+            if own.statistic.is_trend() {
+                let mut same = each.iter().filter(|other| other.over == own.over);
                 let there = same.find_map(|other| other.trend_steps.clone());
-                let find = || Arc::new(TrendSteps::of(&own.periods, TimeStep::Month));
+                let find = || Arc::new(TrendSteps::of(&own.periods, own.over.step));
                 own.trend_steps = Some(there.unwrap_or_else(find));
+            }
+            if let Some(of_plan) = &plan.pairs {
+                let there = pairs.iter().position(|other| other.is_same(of_plan));
+                own.pairs = Some(there.unwrap_or(pairs.len()));
+                if there.is_none() {
+                    pairs.push(of_plan.clone());
+                }
             }
             each.push(own);
         }
-        Self(each)
+        Self { each, pairs }
     }
 
     /// Values that a cell has of each statistic: bins of those that have them, else one.
     pub(super) fn output_counts(&self) -> Vec<usize> {
-        self.0.iter().map(OfCell::output_count).collect()
+        self.each.iter().map(OfCell::output_count).collect()
     }
 
-    /// The statistics of a cell, one after the other, NaN where too little holds data; `values` are one for each step of the
-    /// version, stored unit, NaN no data.
-    pub(super) fn write(&self, values: &[f32], mut out: &mut [f64]) {
+    /// The statistics of a cell, one after the other, NaN where too little holds data; `values` of each product are one for each
+    /// step of its version, stored unit, NaN no data; of the second product none where no statistic is of two.
+    pub(super) fn write(&self, values: [&[f32]; 2], mut out: &mut [f64]) {
         let mut shared = Shared::default();
-        for own in &self.0 {
+        for own in &self.each {
             let (first, rest) = out.split_at_mut(own.output_count());
-            own.write(&values[own.read.clone()], first, &mut shared);
+            match own.pairs {
+                Some(at) => {
+                    let row = shared.correlation(at, || self.pairs[at].row(values));
+                    first[0] = own.of_pairs(row, self.pairs[at].most());
+                }
+                None => own.write(&values[0][own.over.read.clone()], first, &mut shared),
+            }
             out = rest;
         }
     }
@@ -61,32 +84,40 @@ struct Shared {
     trend: Kept<(f64, MannKendall)>,
     least_squares: Kept<LeastSquaresTrend>,
     season: Kept<Season>,
+    /// By the number of what it is made by.
+    correlation: Option<(usize, CorrelationRow)>,
+}
+
+impl Shared {
+    fn correlation(&mut self, at: usize, find: impl FnOnce() -> CorrelationRow) -> &CorrelationRow {
+        let kept = self.correlation.take().filter(|(of, _)| *of == at);
+        let kept = kept.unwrap_or_else(|| (at, find()));
+        &self.correlation.insert(kept).1
+    }
+}
+
+/// What a statistic is found over.
+#[derive(Debug, Clone, PartialEq, Eq)]
+struct Over {
+    /// Steps of the version that are read.
+    read: Range<usize>,
+    /// Means that trends are drawn through.
+    step: TimeStep,
 }
 
 /// What was found of some steps, if it was sought, and if it was there.
-type Kept<T> = Option<(Range<usize>, Option<T>)>;
+type Kept<T> = Option<(Over, Option<T>)>;
 
 /// What was found of some steps, found now if it was not.
 fn once<'a, T>(
     kept: &'a mut Kept<T>,
-    steps: &Range<usize>,
+    over: &Over,
     find: impl FnOnce() -> Option<T>,
 ) -> Option<&'a T> {
-    if kept.as_ref().is_none_or(|(of, _)| of != steps) {
-        *kept = Some((steps.clone(), find()));
+    if kept.as_ref().is_none_or(|(of, _)| of != over) {
+        *kept = Some((over.clone(), find()));
     }
     kept.as_ref().and_then(|(_, found)| found.as_ref())
-}
-
-/// Is it found through the steps that trends are found over?
-fn is_trend(statistic: MapStatistic) -> bool {
-    matches!(
-        statistic,
-        MapStatistic::Trend
-            | MapStatistic::TrendPValue
-            | MapStatistic::LeastSquaresTrend
-            | MapStatistic::LeastSquaresTrendPValue
-    )
 }
 
 /// One statistic of a cell.
@@ -94,8 +125,7 @@ struct OfCell {
     statistic: MapStatistic,
     bins: CalendarBins,
     least_share: f64,
-    /// Steps of the version that are read.
-    read: Range<usize>,
+    over: Over,
     /// Of the steps that are read.
     periods: Vec<Period>,
     /// Bin of each of them.
@@ -108,6 +138,8 @@ struct OfCell {
     all_s: f64,
     /// For trends.
     trend_steps: Option<Arc<TrendSteps>>,
+    /// Which of what correlations are made by, of one.
+    pairs: Option<usize>,
 }
 
 impl OfCell {
@@ -123,10 +155,14 @@ impl OfCell {
             all_s: seconds.iter().fold(0.0, |all, own| all + own),
             seconds,
             trend_steps: None,
+            pairs: None,
             statistic: plan.statistic,
             bins: plan.bins,
             least_share: plan.least_share,
-            read: plan.read.clone(),
+            over: Over {
+                read: plan.read.clone(),
+                step: plan.step,
+            },
             periods,
             bin_of,
             steps_of,
@@ -159,6 +195,23 @@ impl OfCell {
             _ if share >= self.least_share => self.single(values, shared).unwrap_or(f64::NAN),
             _ => f64::NAN,
         };
+    }
+
+    /// What is said of a correlation; `most` are the pairs of a cell that lacks nothing.
+    fn of_pairs(&self, row: &CorrelationRow, most: usize) -> f64 {
+        let MapStatistic::Correlation(of) = self.statistic else {
+            return f64::NAN;
+        };
+        let is_enough = row.count as f64 >= self.least_share * most as f64;
+        let value = match of {
+            // This says how little there is.
+            CorrelationStatistic::Pairs => (row.count > 0).then_some(row.count as f64),
+            _ if !is_enough => None,
+            CorrelationStatistic::Coefficient => row.correlation,
+            CorrelationStatistic::PValue => row.p_value,
+            CorrelationStatistic::EffectivePairs => row.effective_count,
+        };
+        value.unwrap_or(f64::NAN)
     }
 
     /// Share of the time of all steps that holds data.
@@ -205,7 +258,7 @@ impl OfCell {
             }
             MapStatistic::Amplitude | MapStatistic::Phase => {
                 let find = || season(&self.periods, &as_f64(values)).ok();
-                let annual = &once(&mut shared.season, &self.read, find)?.annual;
+                let annual = &once(&mut shared.season, &self.over, find)?.annual;
                 Some(match self.statistic {
                     MapStatistic::Phase => annual.highest_after_days,
                     _ => annual.amplitude,
@@ -224,7 +277,8 @@ impl OfCell {
             MapStatistic::Count
             | MapStatistic::Coverage
             | MapStatistic::Climatology
-            | MapStatistic::Anomaly => None,
+            | MapStatistic::Anomaly
+            | MapStatistic::Correlation(_) => None,
         }
     }
 
@@ -232,7 +286,7 @@ impl OfCell {
         match self.statistic {
             MapStatistic::LeastSquaresTrend | MapStatistic::LeastSquaresTrendPValue => {
                 let find = || steps.least_squares(&as_f64(values)).ok();
-                let found = once(&mut shared.least_squares, &self.read, find)?;
+                let found = once(&mut shared.least_squares, &self.over, find)?;
                 match self.statistic {
                     MapStatistic::LeastSquaresTrend => Some(found.slope_per_decade),
                     _ => found.p_value,
@@ -240,7 +294,7 @@ impl OfCell {
             }
             _ => {
                 let find = || steps.tested_slope(&as_f64(values)).ok();
-                let (slope, test) = once(&mut shared.trend, &self.read, find)?;
+                let (slope, test) = once(&mut shared.trend, &self.over, find)?;
                 Some(match self.statistic {
                     MapStatistic::TrendPValue => test.p_value,
                     _ => *slope,

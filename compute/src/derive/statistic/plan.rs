@@ -3,16 +3,19 @@
 use std::ops::Range;
 
 use contract::ContractError;
-use contract::analysis::{BasePeriod, CalendarBins, MapOptions, MapStatistic};
+use contract::analysis::{AnalysisOptions, BasePeriod, CalendarBins, MapOptions, MapStatistic};
+use contract::computed::{Computation, Computed, ComputedInput, Matching};
 use contract::digest::Digest;
 use contract::key::ObjectKey;
 use contract::manifest::{Manifest, Step};
 use contract::quantity::Quantity;
 use contract::region::Region;
-use contract::time::Period;
+use contract::time::{Period, TimeStep};
 use serde::Serialize;
 
+use super::pairs::Pairs;
 use super::quantity;
+use super::sources::SourcesOf;
 use crate::ComputeError;
 use crate::analysis::timeline::longest_s;
 
@@ -50,6 +53,12 @@ pub(super) struct Plan {
     pub(super) statistic: MapStatistic,
     pub(super) bins: CalendarBins,
     pub(super) least_share: f64,
+    /// Means that trends are drawn through.
+    pub(super) step: TimeStep,
+    /// What a correlation is made by.
+    pub(super) pairs: Option<Pairs>,
+    /// How, of what is of two products.
+    pub(super) computed: Option<Computed>,
     /// Index of the first step that is read, and of the first one after.
     pub(super) read: Range<usize>,
     /// Index of the first step that an anomaly is written of.
@@ -72,13 +81,17 @@ struct MadeOf<'a> {
     base: BasePeriod,
     output: usize,
     read: &'a [(Period, &'a ObjectKey)],
+    /// Of the second product.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    with: Option<&'a [(Period, &'a ObjectKey)]>,
 }
 
 impl Plan {
-    /// The plan for a version of a product.
-    pub(super) fn of(source: &Manifest, options: &MapOptions) -> Result<Self, ComputeError> {
-        let statistic = options.statistic;
-        let (quantity, factor) = quantity::of(source.quantity, statistic)?;
+    /// The plan for a version of a product, or of two.
+    pub(super) fn of(sources: SourcesOf<'_>, options: &MapOptions) -> Result<Self, ComputeError> {
+        let (source, statistic) = (sources.first, options.statistic);
+        let second = sources.second.map(|second| second.quantity);
+        let (quantity, factor) = quantity::of(source.quantity, second, statistic)?;
         if options.least_percent > 100 {
             let text = options.least_percent.to_string();
             return Err(ContractError::invalid("least percent", &text, "0 to 100").into());
@@ -87,30 +100,36 @@ impl Plan {
         let read = &source.steps[ranges.read.clone()];
         let periods: Vec<Period> = read.iter().map(|step| step.period).collect();
         check_steps(statistic, options.bins, &periods)?;
-        let (base, over) = (ranges.base, extent(source, &ranges.read));
-        let title = match statistic {
-            MapStatistic::Climatology => format!("{} climatology {base}", adjective(options.bins)),
-            MapStatistic::Anomaly => format!("anomaly from {base} by {}", options.bins),
-            other => format!("{other} over {}", over.in_words()),
+        let pairs = pairs(sources, options, &ranges)?;
+        let over = match &pairs {
+            Some(pairs) => pairs.extent(),
+            None => extent(source, &ranges.read),
         };
+        let title = title(options, ranges.base, over);
         let least = options.least_percent;
         Ok(Self {
             statistic,
             bins: options.bins,
             least_share: f64::from(least) / 100.0,
-            outputs: outputs(source, options, &ranges)?,
+            step: options.step,
+            computed: computed(sources, options),
+            outputs: outputs(sources, options, (&ranges, pairs.as_ref()))?,
+            pairs,
             read: ranges.read,
             first_written: ranges.inside.start,
             quantity,
             factor,
-            title: match &options.region {
-                Some(asked) => format!(
-                    "{title} in {}, where {least} % or more hold data",
-                    asked.name
-                ),
-                None => format!("{title}, where {least} % or more hold data"),
-            },
+            title,
         })
+    }
+
+    /// Steps of the first product (0) or of the second that are read; none of a second that there is not.
+    pub(super) fn reads(&self, side: usize) -> Option<Range<usize>> {
+        match (&self.pairs, side) {
+            (Some(pairs), side) => pairs.reads.get(side).cloned(),
+            (None, 0) => Some(self.read.clone()),
+            (None, _) => None,
+        }
     }
 
     /// Steps that anomalies are written of.
@@ -122,6 +141,7 @@ impl Plan {
     pub(super) fn is_up_to_date(&self, latest: &Manifest, source: &Manifest) -> bool {
         let made_of = latest.steps.iter().map(|step| step.raw_sha256);
         latest.derived_from.as_ref() == Some(&source.id())
+            && latest.computed == self.computed
             && latest.quantity.is_same_kind(self.quantity)
             && made_of.eq(self.outputs.iter().map(|output| output.made_of))
     }
@@ -139,11 +159,7 @@ struct Ranges {
 
 impl Ranges {
     fn of(source: &Manifest, options: &MapOptions) -> Result<Self, ContractError> {
-        let (window, _steps) = source.steps_inside(options.from, options.to)?;
-        let touched = |step: &Step| step.period.overlaps(window);
-        let first = source.steps.iter().position(touched).unwrap_or_default();
-        let count = source.steps.iter().filter(|step| touched(step)).count();
-        let inside = first..first + count;
+        let inside = inside(source, options)?;
         // Of bins the base period decides what is read; of anomalies the window what is written.
         let read = match (options.statistic, options.base) {
             (MapStatistic::Climatology | MapStatistic::Anomaly, Some(base)) => {
@@ -161,6 +177,99 @@ impl Ranges {
     }
 }
 
+/// Steps that reach into the asked period: they follow each other.
+fn inside(source: &Manifest, options: &MapOptions) -> Result<Range<usize>, ContractError> {
+    let (window, _steps) = source.steps_inside(options.from, options.to)?;
+    let touched = |step: &Step| step.period.overlaps(window);
+    let first = source.steps.iter().position(touched).unwrap_or_default();
+    let count = source.steps.iter().filter(|step| touched(step)).count();
+    Ok(first..first + count)
+}
+
+/// What a correlation is made by.
+fn pairs(
+    sources: SourcesOf<'_>,
+    options: &MapOptions,
+    ranges: &Ranges,
+) -> Result<Option<Pairs>, ContractError> {
+    let (Some(second), Some(asked)) = (sources.second, &options.correlation) else {
+        return Ok(None);
+    };
+    let reads = [ranges.read.clone(), inside(second, options)?];
+    Pairs::of([sources.first, second], reads, options, asked).map(Some)
+}
+
+/// How something of two products was made, and of what.
+fn computed(sources: SourcesOf<'_>, options: &MapOptions) -> Option<Computed> {
+    let (MapStatistic::Correlation(statistic), Some(second), Some(asked)) =
+        (options.statistic, sources.second, &options.correlation)
+    else {
+        return None;
+    };
+    let input = |(name, manifest): (&str, &Manifest)| ComputedInput {
+        name: name.to_owned(),
+        manifest: manifest.id(),
+        matching: Matching::SamePeriod,
+    };
+    Some(Computed {
+        how: Computation::Correlation {
+            statistic,
+            lag_steps: asked.lag_steps,
+            step: options.step,
+            deseasonalised: asked.deseasonalise,
+            least_percent: options.least_percent,
+        },
+        inputs: [("first", sources.first), ("second", second)]
+            .map(input)
+            .into(),
+        from: options.from,
+        to: options.to,
+    })
+}
+
+/// What a title says after that of the product.
+fn title(options: &MapOptions, base: BasePeriod, over: Period) -> String {
+    let (statistic, least) = (options.statistic, options.least_percent);
+    let is_usual = options.step == AnalysisOptions::USUAL_STEP;
+    let mut title = match statistic {
+        MapStatistic::Climatology => format!("{} climatology {base}", adjective(options.bins)),
+        MapStatistic::Anomaly => format!("anomaly from {base} by {}", options.bins),
+        _ if statistic.is_of_two() || (statistic.is_trend() && !is_usual) => {
+            let (means, over) = (means(options.step), over.in_words());
+            format!("{statistic} of {means} over {over}")
+        }
+        other => format!("{other} over {}", over.in_words()),
+    };
+    if let Some(correlation) = &options.correlation {
+        if correlation.deseasonalise {
+            title += ", seasons taken off";
+        }
+        let (lag, steps) = (correlation.lag_steps, correlation.lag_steps.unsigned_abs());
+        if lag != 0 {
+            let way = if lag > 0 { "later" } else { "earlier" };
+            let word = if steps == 1 { "step" } else { "steps" };
+            title = format!("{title}, the second {steps} {word} {way}");
+        }
+    }
+    if let Some(asked) = &options.region {
+        title = format!("{title} in {}", asked.name);
+    }
+    format!("{title}, where {least} % or more hold data")
+}
+
+/// Means of a step, for people.
+fn means(step: TimeStep) -> &'static str {
+    match step {
+        TimeStep::Native => "steps",
+        TimeStep::Day => "days",
+        TimeStep::Week => "weeks",
+        TimeStep::Month => "months",
+        TimeStep::Season => "seasons",
+        TimeStep::Year => "years",
+        TimeStep::Total => "all the time",
+    }
+}
+
 /// From the first to the last of some steps.
 fn extent(source: &Manifest, range: &Range<usize>) -> Period {
     Period {
@@ -171,13 +280,15 @@ fn extent(source: &Manifest, range: &Range<usize>) -> Period {
 
 /// Every step that is written.
 fn outputs(
-    source: &Manifest,
+    sources: SourcesOf<'_>,
     options: &MapOptions,
-    ranges: &Ranges,
+    (ranges, pairs): (&Ranges, Option<&Pairs>),
 ) -> Result<Vec<Output>, ContractError> {
-    let (statistic, bins, base) = (options.statistic, options.bins, ranges.base);
-    let read = source.steps[ranges.read.clone()].iter();
-    let inputs: Vec<(Period, &ObjectKey)> = read.map(|step| (step.period, &step.field)).collect();
+    let (source, statistic) = (sources.first, options.statistic);
+    let (bins, base) = (options.bins, ranges.base);
+    let inputs = fields(source, &ranges.read);
+    let second = sources.second.zip(pairs);
+    let with = second.map(|(second, pairs)| fields(second, &pairs.reads[1]));
     let made_of = |output: usize| {
         Digest::of_json(&MadeOf {
             kind: "statistic",
@@ -187,9 +298,9 @@ fn outputs(
             base,
             output,
             read: &inputs,
+            with: with.as_deref(),
         })
     };
-    let over = extent(source, &ranges.read);
     Ok(match statistic {
         MapStatistic::Climatology => {
             let output = |(index, (bin, period)): (usize, (usize, Period))| Output {
@@ -213,12 +324,27 @@ fn outputs(
                 .map(output)
                 .collect()
         }
-        _ => vec![Output {
-            period: over,
-            origin: format!("{statistic} of {} steps, {over}", inputs.len()),
-            made_of: made_of(0),
-        }],
+        _ => {
+            let (over, count) = match pairs {
+                Some(pairs) => (pairs.extent(), format!("{} pairs", pairs.most())),
+                None => (
+                    extent(source, &ranges.read),
+                    format!("{} steps", inputs.len()),
+                ),
+            };
+            vec![Output {
+                period: over,
+                origin: format!("{statistic} of {count}, {over}"),
+                made_of: made_of(0),
+            }]
+        }
     })
+}
+
+/// What some steps hold.
+fn fields<'a>(source: &'a Manifest, read: &Range<usize>) -> Vec<(Period, &'a ObjectKey)> {
+    let steps = source.steps[read.clone()].iter();
+    steps.map(|step| (step.period, &step.field)).collect()
 }
 
 /// Steps whose middle lies in a base period: they follow each other.

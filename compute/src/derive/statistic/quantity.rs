@@ -2,14 +2,20 @@
 
 use contract::ContractError;
 use contract::analysis::MapStatistic;
-use contract::quantity::Quantity;
+use contract::computed::CorrelationStatistic;
+use contract::quantity::{MAX_TITLE_BYTES, Quantity};
 
 /// Years in a decade.
 const DECADE: f64 = 10.0;
 
 /// The quantity of a statistic, and what its values are multiplied with: means stay what they are, differences are no
-/// temperatures or fluxes with a sign of their own any more, and are kept in the unit that people read.
-pub(super) fn of(own: Quantity, statistic: MapStatistic) -> Result<(Quantity, f64), ContractError> {
+/// temperatures or fluxes with a sign of their own any more, and are kept in the unit that people read. Of two products `second` is
+/// that of the other one.
+pub(super) fn of(
+    own: Quantity,
+    second: Option<Quantity>,
+    statistic: MapStatistic,
+) -> Result<(Quantity, f64), ContractError> {
     let display = own.display();
     let unit = plain_unit(display.unit);
     let (word, unit, says, factor) = match statistic {
@@ -18,6 +24,9 @@ pub(super) fn of(own: Quantity, statistic: MapStatistic) -> Result<(Quantity, f6
         | MapStatistic::Max
         | MapStatistic::Percentile(_)
         | MapStatistic::Climatology => return Ok((own, 1.0)),
+        MapStatistic::Correlation(of) => {
+            return Ok((of_two([own, second.unwrap_or(own)], of)?, 1.0));
+        }
         MapStatistic::MinTime | MapStatistic::MaxTime => {
             let (word, says) = match statistic {
                 MapStatistic::MinTime => ("min_time", "lowest days after the start of 1970"),
@@ -71,6 +80,31 @@ pub(super) fn of(own: Quantity, statistic: MapStatistic) -> Result<(Quantity, f6
     Ok((Quantity::open(&name, &unit, &title)?, factor))
 }
 
+/// What is said of a correlation, by a name of its own: which two go together is in the title.
+fn of_two(both: [Quantity; 2], of: CorrelationStatistic) -> Result<Quantity, ContractError> {
+    let (word, says) = match of {
+        CorrelationStatistic::Coefficient => ("correlation", "correlation"),
+        CorrelationStatistic::PValue => ("correlation_p_value", "p value of the correlation"),
+        CorrelationStatistic::Pairs => ("correlation_pairs", "pairs of values"),
+        CorrelationStatistic::EffectivePairs => {
+            ("correlation_effective_pairs", "effective pairs of values")
+        }
+    };
+    let [first, second] = both.map(Quantity::title);
+    let whole = format!("{first} and {second}, {says}");
+    let title = if whole.len() <= MAX_TITLE_BYTES {
+        &whole
+    } else {
+        says
+    };
+    let quantity = Quantity::open(word, "1", title)?;
+    match of {
+        // Drawn alike wherever it is, from less to more than none.
+        CorrelationStatistic::Coefficient => quantity.over([-1.0, 1.0]),
+        _ => Ok(quantity),
+    }
+}
+
 /// A unit that people read, of differences, as UDUNITS spells it: `g C m⁻² yr⁻¹` as `g m-2 year-1`, `°C` as `K`.
 fn plain_unit(shown: &str) -> String {
     let plain = |c: char| match c {
@@ -99,7 +133,7 @@ mod tests {
     #[test]
     fn differences_have_a_quantity_of_their_own_in_the_unit_people_read() {
         let of = |own, statistic| {
-            let (quantity, factor) = of(own, statistic).unwrap();
+            let (quantity, factor) = super::of(own, None, statistic).unwrap();
             (quantity.word(), quantity.unit(), factor)
         };
         let sst = Quantity::SeaSurfaceTemperature;
@@ -127,10 +161,34 @@ mod tests {
     }
 
     #[test]
+    fn a_correlation_is_from_less_to_more_than_none_and_names_both() {
+        let sst = Quantity::SeaSurfaceTemperature;
+        let of = |second, statistic: CorrelationStatistic| {
+            let statistic = MapStatistic::Correlation(statistic);
+            super::of(sst, Some(second), statistic).unwrap().0
+        };
+        let found = of(Quantity::WindSpeed, CorrelationStatistic::Coefficient);
+        assert_eq!((found.word(), found.unit()), ("correlation", "1"));
+        assert_eq!(
+            found.title(),
+            "Sea-surface temperature and Wind speed at 10 m, correlation"
+        );
+        let Quantity::Open(open) = found.over([-0.5, 0.25]).unwrap() else {
+            panic!("{found:?} is built in");
+        };
+        assert_eq!(open.words().range, Some([-1.0, 1.0]));
+        assert!(open.is_difference());
+        let long = Quantity::open("long", "1", &"t".repeat(MAX_TITLE_BYTES)).unwrap();
+        let found = of(long, CorrelationStatistic::PValue);
+        assert_eq!(found.title(), "p value of the correlation");
+    }
+
+    #[test]
     fn every_quantity_has_every_statistic() {
         for own in Quantity::ALL {
             for statistic in MapStatistic::ALL {
-                assert!(super::of(own, statistic).is_ok(), "{own:?} {statistic}");
+                let found = super::of(own, Some(own), statistic);
+                assert!(found.is_ok(), "{own:?} {statistic}");
             }
         }
     }

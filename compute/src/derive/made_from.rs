@@ -1,0 +1,105 @@
+//! The versions that a derived one was made from, as its manifest says it.
+
+use contract::manifest::{Manifest, ManifestId};
+
+/// The version that something was accumulated or a statistic made from, both of what is of two; none of anything else.
+pub(super) fn made_from(manifest: &Manifest) -> Vec<&ManifestId> {
+    match &manifest.computed {
+        None => manifest.derived_from.iter().collect(),
+        Some(computed) if computed.how.is_by_step() => vec![],
+        Some(computed) => computed.inputs.iter().map(|it| &it.manifest).collect(),
+    }
+}
+
+/// Was one version made from newer versions than another of the same products, and from none that is older?
+pub(super) fn is_from_newer(latest: &Manifest, derived: &Manifest) -> bool {
+    let (theirs, own) = (made_from(latest), made_from(derived));
+    let is_of_same = theirs.iter().map(|id| &id.product);
+    let is_of_same = is_of_same.eq(own.iter().map(|id| &id.product));
+    let numbers = || theirs.iter().zip(&own).map(|(a, b)| (a.number, b.number));
+    is_of_same && numbers().all(|(a, b)| a >= b) && numbers().any(|(a, b)| a > b)
+}
+
+#[cfg(test)]
+mod tests {
+    use contract::computed::{
+        Computation, Computed, ComputedInput, CorrelationStatistic, Matching,
+    };
+    use contract::digest::Digest;
+    use contract::grid::Grid;
+    use contract::key::ObjectKey;
+    use contract::manifest::MANIFEST_SCHEMA;
+    use contract::quantity::Quantity;
+    use contract::time::TimeStep;
+
+    use super::*;
+
+    /// Made from versions with these numbers.
+    fn made(numbers: [u64; 2], how: Computation) -> Manifest {
+        let product: contract::product::ProductId = "both".parse().unwrap();
+        let input = |(name, number): (&str, u64)| ComputedInput {
+            name: name.to_owned(),
+            manifest: format!("{name}@{number}-00000000").parse().unwrap(),
+            matching: Matching::SamePeriod,
+        };
+        let inputs = ["first", "second"].into_iter().zip(numbers).map(input);
+        let inputs: Vec<ComputedInput> = inputs.collect();
+        Manifest {
+            schema: MANIFEST_SCHEMA,
+            number: 1,
+            title: String::new(),
+            quantity: Quantity::WindSpeed,
+            synthetic: false,
+            source: String::new(),
+            grid: Grid {
+                rows: 1,
+                cols: 1,
+                north_deg: 1.0,
+                west_deg: 0.0,
+                dlat_deg: 1.0,
+                dlon_deg: 1.0,
+            },
+            steps: vec![],
+            domain: ObjectKey::domain(&product, &Digest::of(b"")),
+            series: vec![],
+            derived_from: Some(inputs[0].manifest.clone()),
+            computed: Some(Computed {
+                how,
+                inputs,
+                from: None,
+                to: None,
+            }),
+            notices: vec![],
+            product,
+        }
+    }
+
+    #[test]
+    fn what_is_of_two_is_newer_by_either_and_never_where_the_other_is_older() {
+        let of = |numbers| {
+            let how = Computation::Correlation {
+                statistic: CorrelationStatistic::Pairs,
+                lag_steps: 0,
+                step: TimeStep::Month,
+                deseasonalised: false,
+                least_percent: 50,
+            };
+            made(numbers, how)
+        };
+        let own = of([2, 5]);
+        assert_eq!(made_from(&own).len(), 2);
+        for (numbers, is_newer) in [
+            ([2, 5], false),
+            ([3, 5], true),
+            ([2, 6], true),
+            ([3, 4], false),
+            ([1, 6], false),
+            ([1, 1], false),
+        ] {
+            assert_eq!(is_from_newer(&of(numbers), &own), is_newer, "{numbers:?}");
+        }
+        let expression = "first + second".to_owned();
+        let by_step = made([9, 9], Computation::Expression { expression });
+        assert!(made_from(&by_step).is_empty() && !is_from_newer(&by_step, &own));
+    }
+}
