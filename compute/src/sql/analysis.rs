@@ -10,6 +10,7 @@ use contract::analysis::{
 };
 use contract::grid::LonLatDeg;
 use contract::manifest::Manifest;
+use contract::region::AskedRegion;
 use datafusion::arrow::array::{
     ArrayRef, BooleanArray, Float64Array, RecordBatch, StringArray, UInt64Array,
 };
@@ -38,7 +39,7 @@ pub(super) const ABOUT: [&str; 4] = [
 ];
 
 /// What is made of which series.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 struct Analysis {
     of: SeriesQuery,
     made: Made,
@@ -129,6 +130,15 @@ impl Question for Analysis {
                 unit,
             ],
         }))
+    }
+
+    fn over(&self, region: AskedRegion) -> Arc<dyn Question> {
+        let mut over = self.clone();
+        if let SeriesQuery::Region(own) = &mut over.of {
+            own.region = region.region;
+            own.region_name = region.name;
+        }
+        Arc::new(over)
     }
 
     fn rows<'a>(

@@ -61,6 +61,14 @@ impl Question for BudgetQuery {
         ]))
     }
 
+    fn over(&self, region: AskedRegion) -> Arc<dyn Question> {
+        Arc::new(Self {
+            region: region.region,
+            region_name: region.name,
+            ..self.clone()
+        })
+    }
+
     fn rows<'a>(
         &'a self,
         engine: &'a Engine,

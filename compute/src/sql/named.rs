@@ -36,6 +36,27 @@ impl Named {
         })
     }
 
+    /// A mask and a code, `name:3`, the name as of [`Self::of`]: the cells where that mask has this code.
+    pub(super) fn with_code(text: &str) -> Option<(Self, f32)> {
+        let (mask, code) = text.split_once(':')?;
+        let code: f32 = code.trim().parse().ok()?;
+        Some((Self::of(mask)?, code)).filter(|_| code.is_finite())
+    }
+
+    /// The version that must be there.
+    ///
+    /// # Errors
+    /// `UnknownProduct` if it is not.
+    pub(super) async fn required(&self, engine: &Engine) -> Result<Manifest, ComputeError> {
+        if let Some(manifest) = self.manifest(engine).await? {
+            return Ok(manifest);
+        }
+        Err(ComputeError::UnknownProduct {
+            product: self.product.to_string(),
+            known: manifests::products(engine.store()).await?,
+        })
+    }
+
     pub(super) async fn manifest(&self, engine: &Engine) -> Result<Option<Manifest>, ComputeError> {
         let store = engine.store();
         let manifest = match self.number {
@@ -67,6 +88,28 @@ mod tests {
         let digest = Some("0a1b2c3d".to_owned());
         assert_eq!(of("a-b@12-0a1b2c3d"), Some((p, Some(12), digest)));
         for wrong in ["a-b@", "a-b@x", "../a", "A", ""] {
+            assert_eq!(of(wrong), None, "{wrong}");
+        }
+    }
+
+    #[test]
+    fn a_code_follows_the_name_of_a_mask() {
+        let of = |text: &str| {
+            let (named, code) = Named::with_code(text)?;
+            Some((named.product.to_string(), named.number, code.to_string()))
+        };
+        let p = "a-b".to_owned();
+        assert_eq!(of("a_b:3"), Some((p.clone(), None, "3".to_owned())));
+        assert_eq!(of("a-b@2:-1.5"), Some((p, Some(2), "-1.5".to_owned())));
+        for wrong in [
+            "a-b",
+            "a-b:",
+            "a-b:x",
+            "a-b:nan",
+            "A:1",
+            "{\"a\":1}",
+            "a-b@x:1",
+        ] {
             assert_eq!(of(wrong), None, "{wrong}");
         }
     }

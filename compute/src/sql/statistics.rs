@@ -74,6 +74,15 @@ impl Question for StatisticsQuery {
         Arc::new(Schema::new(fields))
     }
 
+    fn over(&self, region: AskedRegion) -> Arc<dyn Question> {
+        let AskedGeometry { geometry, name } = region.into();
+        Arc::new(Self {
+            geometry,
+            geometry_name: name,
+            ..self.clone()
+        })
+    }
+
     fn rows<'a>(
         &'a self,
         engine: &'a Engine,

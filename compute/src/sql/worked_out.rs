@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use async_trait::async_trait;
 use contract::manifest::Manifest;
+use contract::region::AskedRegion;
 use datafusion::arrow::array::{ArrayRef, RecordBatch, TimestampMillisecondArray};
 use datafusion::arrow::datatypes::SchemaRef;
 use datafusion::catalog::memory::MemorySourceConfig;
@@ -18,12 +19,19 @@ use futures::future::BoxFuture;
 
 use super::named::Named;
 use super::version::external;
+use crate::region::mask;
 use crate::{ComputeError, Engine};
+
+/// Where a question of the cells of a mask is until their rows are read: looking them up is no part of a plan.
+const EVERYWHERE: &str = "global";
 
 /// A question about a version of a product.
 pub(super) trait Question: Debug + Send + Sync {
     /// Columns of its answer.
     fn schema(&self) -> SchemaRef;
+
+    /// The same of another region.
+    fn over(&self, region: AskedRegion) -> Arc<dyn Question>;
 
     /// Rows of its answer.
     fn rows<'a>(
@@ -89,10 +97,13 @@ impl TableFunctionImpl for AnswerFunction {
         let Some(product) = Named::of(product) else {
             return plan_err!("{product:?} is no product");
         };
+        let mask = Named::with_code(place);
+        let place = mask.as_ref().map_or(*place, |_| EVERYWHERE);
         let question = (kind.asked)(&product, place, more).map_err(external)?;
         Ok(Arc::new(AnswerTable {
             engine: self.engine.clone(),
             product,
+            mask,
             question,
         }))
     }
@@ -102,7 +113,22 @@ impl TableFunctionImpl for AnswerFunction {
 struct AnswerTable {
     engine: Engine,
     product: Named,
+    /// Whose cells with this code the question is of, if it is.
+    mask: Option<(Named, f32)>,
     question: Arc<dyn Question>,
+}
+
+impl AnswerTable {
+    async fn rows(&self) -> Result<RecordBatch, ComputeError> {
+        let engine = &self.engine;
+        let manifest = self.product.required(engine).await?;
+        let Some((named, code)) = &self.mask else {
+            return self.question.rows(engine, &manifest).await;
+        };
+        let codes = named.required(engine).await?;
+        let region = mask::region(engine.store(), &codes, *code).await?;
+        self.question.over(region).rows(engine, &manifest).await
+    }
 }
 
 impl Debug for AnswerTable {
@@ -128,18 +154,9 @@ impl TableProvider for AnswerTable {
         _filters: &[Expr],
         _limit: Option<usize>,
     ) -> Result<Arc<dyn ExecutionPlan>> {
-        let engine = &self.engine;
-        let manifest = self.product.manifest(engine).await.map_err(external)?;
-        let Some(manifest) = manifest else {
-            let known = storage::manifests::products(engine.store()).await;
-            return Err(external(ComputeError::UnknownProduct {
-                product: self.product.product.to_string(),
-                known: known.map_err(external)?,
-            }));
-        };
-        let batch = self.question.rows(engine, &manifest).await;
+        let batch = self.rows().await.map_err(external)?;
         Ok(MemorySourceConfig::try_new_exec(
-            &[vec![batch.map_err(external)?]],
+            &[vec![batch]],
             self.schema(),
             projection.cloned(),
         )?)

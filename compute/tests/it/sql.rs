@@ -389,6 +389,14 @@ const REFUSED: &[(&str, &str)] = &[
     ),
     ("SELECT * FROM budget('sst-test', 'atlantis')", "atlantis"),
     (
+        "SELECT * FROM stats('sst-test', 'atlantis:1')",
+        "product \"atlantis\" is unknown",
+    ),
+    (
+        "SELECT * FROM analysis('sst-test', 'sst_test@1:1', 'anomaly')",
+        "a mask is one map",
+    ),
+    (
         "SELECT * FROM budget('atlantis', 'global')",
         "product \"atlantis\" is unknown",
     ),
@@ -646,6 +654,59 @@ async fn budgets_are_tables_whose_sums_are_exact() {
     let closed = "SELECT (SELECT sum(budget_kg) FROM budget('flux', '162,-10,170,10', 'month'))
         = (SELECT budget_kg FROM budget('flux', '162,-10,170,10')) AS closed";
     assert_eq!(one(&sql, closed).await, "true");
+}
+
+/// The cells of a mask beside the box that they fill: the same rows, but for what areas are rounded to.
+#[tokio::test(flavor = "multi_thread")]
+async fn cells_of_a_mask_are_a_region_of_each_function() {
+    const BOX: &str = "162,-10,170,10";
+    let (_folder, store) = folder_store();
+    let (engine, _answer) = analysed(&store).await;
+    let flux = wavy_year(&GRID);
+    land(&store, &product("flux"), Quantity::CarbonFlux, GRID, &flux).await;
+    let code = |cell: usize| match (cell / 150, cell % 150) {
+        (55..75, 4..20) => 3.0,
+        _ => f32::NAN,
+    };
+    let codes: Vec<f32> = (0..GRID.cell_count()).map(code).collect();
+    let basin = Quantity::open("basin", "1", "Basin").unwrap();
+    let year = [(Period::year(2000).unwrap(), codes)];
+    land(&store, &product("my-basins"), basin, GRID, &year).await;
+    let sql = sql_of(&engine);
+    for (asked, rows) in [
+        (
+            "SELECT mean, max, coverage_percent FROM stats('sst', 'PLACE', 'year', 'mean,max')",
+            8,
+        ),
+        (
+            "SELECT budget_tg, ocean_area_m2 FROM budget('flux', 'PLACE', 'month')",
+            12,
+        ),
+        (
+            "SELECT mean, spread, count FROM analysis('sst', 'PLACE', 'climatology')",
+            12,
+        ),
+    ] {
+        let of = async |place: &str| -> Vec<f64> {
+            let found = texts(&sql, &asked.replace("PLACE", place)).await;
+            assert_eq!(found.len(), rows, "{asked}");
+            let numbers = found.iter().flatten().map(|text| text.parse().unwrap());
+            numbers.collect()
+        };
+        let (whole, filled) = (of("global").await, of(BOX).await);
+        for place in ["my-basins:3", "my_basins@1:3"] {
+            let found = of(place).await;
+            let is_near = |(a, b): (&f64, &f64)| (a - b).abs() <= 1e-9 * b.abs();
+            assert!(
+                found.iter().zip(&filled).all(is_near),
+                "{asked}: {found:?} {filled:?}"
+            );
+            assert!(
+                !found.iter().zip(&whole).all(is_near),
+                "{asked}: it is everywhere"
+            );
+        }
+    }
 }
 
 /// Eight years of months that rise by some 1.2 kelvin a decade, with a season; and what is told of a region of them.
