@@ -326,3 +326,31 @@ async fn shipped_profiles_use_the_quality_of_their_families() {
         [Y, N, Y, Y, Y, N, Y, N]
     );
 }
+
+/// Masks of RECCAP2 say no time and no unit, and 0 where a cell is in no basin.
+#[tokio::test]
+async fn masks_of_reccap2_are_known_by_name_and_have_codes_where_there_is_a_basin() {
+    let place = Place::new();
+    let codes: Vec<i8> = (0..32).map(|cell| cell % 6).collect();
+    let made = |name, codes: &[i8]| {
+        let values = Values::Bytes(codes.to_vec());
+        Made::new(name, &["lat", "lon"], values)
+    };
+    let mut file = MadeFile::days(1)
+        .with(made("open_ocean", &codes))
+        .with(made("southern", &[1; 32]));
+    file.variables.retain(|variable| variable.name != "time");
+    let path = place.path("RECCAP2_region_masks_all_v20221025.nc");
+    file.write(&path);
+    let outcomes = place.land(&[path]).await;
+    assert!(!outcomes[0].is_rejected(), "{}", outcomes[0]);
+    let manifest = place.newest("reccap2-basins").await;
+    assert_eq!(manifest.steps.len(), 1, "a mask is one map");
+    for (code, value) in codes.iter().zip(place.values(&manifest, 0).await) {
+        let is_it = match code {
+            0 => value.is_nan(),
+            code => value.to_bits() == f32::from(*code).to_bits(),
+        };
+        assert!(is_it, "{code}: {value}");
+    }
+}

@@ -5,7 +5,7 @@ use std::sync::LazyLock;
 use super::Profile;
 
 /// Name and text of each, in the order in which they are tried.
-const TEXTS: [(&str, &str); 33] = [
+const TEXTS: [(&str, &str); 34] = [
     (
         "takahashi09-flux",
         include_str!("../../../profiles/takahashi09-flux.toml"),
@@ -105,6 +105,10 @@ const TEXTS: [(&str, &str); 33] = [
     (
         "onedeg-land",
         include_str!("../../../profiles/onedeg-land.toml"),
+    ),
+    (
+        "reccap2-basins",
+        include_str!("../../../profiles/reccap2-basins.toml"),
     ),
     (
         "ostia-sst",
