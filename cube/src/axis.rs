@@ -282,3 +282,105 @@ pub(crate) fn chunk_steps(definition: &Definition) -> Result<usize, CubeError> {
         shape.map_err(|e| CubeError::library(&arrays::name(definition), "its chunks", e))?;
     Ok(shape[0].get() as usize)
 }
+
+#[cfg(test)]
+mod tests {
+    use contract::grid::Grid;
+    use icechunk::format::{ChunkIndices, Path};
+    use storage::Store;
+    use zarrs_icechunk::AsyncIcechunkStore;
+
+    use super::*;
+    use crate::group::write_group;
+    use crate::{At, Edit, Repository};
+
+    const GRID: Grid = Grid {
+        rows: 4,
+        cols: 8,
+        north_deg: 90.0,
+        west_deg: -180.0,
+        dlat_deg: 45.0,
+        dlon_deg: 45.0,
+    };
+
+    /// A cube of January 1970.
+    async fn cube(quantity: Quantity) -> Repository {
+        let description = Description {
+            product: "p".parse().unwrap(),
+            title: "P".to_owned(),
+            quantity,
+            synthetic: true,
+            source: "a test".to_owned(),
+            grid: GRID,
+            version: None,
+        };
+        let created = Repository::create(&Store::memory(), "p", &description).await;
+        let repository = created.unwrap();
+        let mut edit = Edit::begin(&repository).await.unwrap();
+        let values: Arc<[f32]> = vec![1.0; GRID.cell_count()].into();
+        let january = Period::month(1970, 1).unwrap();
+        edit.put(january, values).await.unwrap();
+        edit.commit("a step").await.unwrap();
+        repository
+    }
+
+    #[tokio::test]
+    async fn a_chunk_of_periods_or_digests_that_is_lost_is_told_and_no_zeros() {
+        for name in ["time_bnds", "values_sha256"] {
+            let repository = cube(Quantity::CarbonFlux).await;
+            assert!(repository.at(&At::Newest).await.is_ok());
+            let session = repository.session().await.unwrap();
+            let mut session = session.write().await;
+            let path = Path::new(&format!("/{name}")).unwrap();
+            let first = ChunkIndices(vec![0, 0]);
+            let is_there = session.get_chunk_ref(&path, &first).await.unwrap();
+            assert!(is_there.is_some(), "{name}");
+            session.set_chunk_ref(path, first, None).await.unwrap();
+            session.commit("a chunk less").execute().await.unwrap();
+            drop(session);
+            let told = repository.at(&At::Newest).await.map(|_cube| ());
+            let told = told.unwrap_err().to_string();
+            assert!(
+                told.contains(name) && told.contains("it is not there"),
+                "{told}"
+            );
+        }
+    }
+
+    /// Two chunks, of which the first is of zeros alone.
+    #[tokio::test]
+    async fn a_chunk_of_zeros_that_is_not_stored_is_as_long_as_others() {
+        let repository = cube(Quantity::CarbonFlux).await;
+        let session = repository.session().await.unwrap();
+        let store = Arc::new(AsyncIcechunkStore::from(session));
+        let root = serde_json::Map::new();
+        write_group(&store, arrays::LEVELS, root).await.unwrap();
+        let steps = arrays::TIME_CHUNK as usize + 6;
+        let definition = arrays::level_ranges(steps).unwrap();
+        let mut numbers = vec![0.0; 2 * steps];
+        for (index, number) in numbers.iter_mut().enumerate().skip(2 * (steps - 6)) {
+            *number = index as f32;
+        }
+        let all = (&numbers[..], 2);
+        write_numbers(&store, &definition, all, 0).await.unwrap();
+        let asked = arrays::level_ranges(1).unwrap();
+        let found: Vec<f32> = read_array(&store, &asked, "p", Some(0.0)).await.unwrap();
+        let bits = |all: &[f32]| all.iter().map(|it| it.to_bits()).collect::<Vec<_>>();
+        assert!(bits(&found) == bits(&numbers), "{} numbers", found.len());
+        let lost = read_array::<_, f32>(&store, &asked, "p", None).await;
+        assert!(lost.unwrap_err().to_string().contains("it is not there"));
+    }
+
+    /// Their first chunk is of zeros alone, which are not stored.
+    #[tokio::test]
+    async fn starts_of_sums_since_1970_are_no_lost_chunk() {
+        let repository = cube(Quantity::AccumulatedCarbon).await;
+        let session = repository.session().await.unwrap();
+        let path = Path::new("/step_start").unwrap();
+        let first = ChunkIndices(vec![0]);
+        let stored = session.read().await.get_chunk_ref(&path, &first).await;
+        assert!(stored.unwrap().is_none(), "it is stored");
+        let cube = repository.at(&At::Newest).await.unwrap();
+        assert_eq!(cube.steps()[0].period, Period::month(1970, 1).unwrap());
+    }
+}

@@ -300,4 +300,53 @@ mod tests {
         let few = Spooled::one_of(1, folder, &GRID, head).unwrap();
         assert!(few.put(&other, &product).await.is_err(), "rows are missing");
     }
+
+    /// Of 81 chunks, in bands of which each has complete cells.
+    #[tokio::test]
+    async fn counts_of_more_chunks_than_a_group_are_written_and_read_in_bands() {
+        let grid = Grid {
+            rows: 540,
+            cols: 1000,
+            north_deg: 54.0,
+            west_deg: 0.0,
+            dlat_deg: 0.2,
+            dlon_deg: 0.2,
+        };
+        assert!(field_chunks(&grid).len() > CHUNKS_PER_GROUP);
+        let january = Period::month(2001, 1).unwrap();
+        let mut counts = Contributed::nothing(&grid, january.start);
+        let has_data: Vec<bool> = (0..grid.cell_count()).map(|i| i % 1007 < 3).collect();
+        counts.add(january, &has_data);
+        for (number, steps) in (0..).zip(&mut counts.steps) {
+            *steps = number;
+        }
+        let (store, product) = (Store::memory(), "p".parse().unwrap());
+        let head = (counts.period, counts.of_steps);
+        let mut spooled = Spooled::one_of(1, FOLDER.as_path(), &grid, head).unwrap();
+        for rows in [0..300usize, 300..540] {
+            let cells = rows.start * 1000..rows.end * 1000;
+            let band = Contributed {
+                steps: counts.steps[cells.clone()].to_vec(),
+                milliseconds: counts.milliseconds[cells].to_vec(),
+                ..counts
+            };
+            spooled.band(&band).unwrap();
+        }
+        let (key, complete_cells) = spooled.put(&store, &product).await.unwrap();
+        assert!(complete_cells > 1000);
+        assert_eq!(complete_cells, counts.complete_cells());
+        assert!(read(&store, &key, &grid).await.unwrap() == counts);
+        let mut reader = Reader::open(&store, &key, &grid).await.unwrap();
+        let mut found = Contributed {
+            steps: vec![],
+            milliseconds: vec![],
+            ..counts
+        };
+        for rows in [480, 60] {
+            let band = reader.rows(rows).unwrap();
+            found.steps.extend(band.steps);
+            found.milliseconds.extend(band.milliseconds);
+        }
+        assert!(found == counts, "read in bands it is another one");
+    }
 }

@@ -155,6 +155,20 @@ mod tests {
     }
 
     #[test]
+    fn a_bucket_that_is_elsewhere_is_told_with_its_region() {
+        let body = "<Error><Code>PermanentRedirect</Code><Message>Ask there.</Message><Region>eu-central-1</Region></Error>";
+        let moved = Refusal::of(&generic("400 Bad Request", body));
+        let said = "400 Bad Request PermanentRedirect, Ask there, its region is eu-central-1";
+        assert_eq!(moved, Some(Refusal::Region(said.to_owned())));
+        let without_words = Error::Generic {
+            store: "S3",
+            source: "Received redirect without LOCATION, this normally indicates an incorrectly configured region".into(),
+        };
+        let moved = Refusal::of(&without_words);
+        assert!(matches!(moved, Some(Refusal::Region(_))), "{moved:?}");
+    }
+
+    #[test]
     fn a_token_that_has_ended_is_no_wrong_request() {
         let of = |status: &str, name: &str| Refusal::of(&generic(status, &code(name)));
         let ended = of("400 Bad Request", "ExpiredToken");

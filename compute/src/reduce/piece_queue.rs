@@ -84,3 +84,168 @@ pub(super) async fn reduced(
     drop(awaited);
     Ok(all)
 }
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+    use std::sync::atomic::{AtomicUsize, Ordering};
+    use std::time::{Duration, Instant};
+
+    use contract::digest::Digest;
+    use contract::key::ObjectKey;
+    use tokio::sync::{Notify, Semaphore, oneshot};
+
+    use super::super::accumulator::StepSums;
+    use super::super::question::Layout;
+    use super::*;
+
+    /// Time after which a test that waits has failed.
+    const LIMIT: Duration = Duration::from_secs(30);
+
+    /// So many pieces, each of a step of its own.
+    fn pieces(count: u32) -> Vec<Piece> {
+        let piece = |number: u32| Piece {
+            key: ObjectKey::field(&"p".parse().unwrap(), &Digest::of(&number.to_le_bytes())),
+            address: String::new(),
+            layout: Layout::Blocks,
+            first_step: number,
+            steps: 0..1,
+            rows: vec![],
+            inside: vec![],
+        };
+        (0..count).map(piece).collect()
+    }
+
+    /// What a piece comes to: one value in its step.
+    fn sums_of(piece: &Piece, sum: i128) -> Accumulated {
+        let sums = StepSums {
+            count: 1,
+            sum,
+            ..StepSums::default()
+        };
+        Accumulated {
+            steps: BTreeMap::from([(piece.first_step, sums)]),
+            ..Accumulated::default()
+        }
+    }
+
+    fn failed() -> ComputeError {
+        ComputeError::inconsistent("a piece", "it cannot be read")
+    }
+
+    #[tokio::test]
+    async fn every_piece_is_reduced_once_by_any_number_of_threads() {
+        for count in [0, 1, 2, 7, 50] {
+            for at_once in [0, 1, 2, 3, 8, 100] {
+                let reduce = async |piece: Piece| Ok(sums_of(&piece, i128::from(piece.first_step)));
+                let all = reduced(reduce, pieces(count), at_once).await.unwrap();
+                let found = all
+                    .steps
+                    .iter()
+                    .map(|(step, own)| (*step, own.count, own.sum));
+                let wanted = (0..count).map(|step| (step, 1, i128::from(step)));
+                assert!(
+                    found.eq(wanted),
+                    "{count} pieces, {at_once} at once: {all:?}"
+                );
+            }
+        }
+    }
+
+    #[tokio::test]
+    async fn as_many_are_worked_on_at_a_time_as_may_be_and_no_more() {
+        for (count, at_once, wanted) in [(12, 3, 3), (12, 1, 1), (2, 8, 2)] {
+            let (now, most) = (Arc::new(AtomicUsize::new(0)), Arc::new(AtomicUsize::new(0)));
+            let reduce = {
+                let (most, end) = (Arc::clone(&most), Instant::now() + LIMIT);
+                async move |piece: Piece| {
+                    let own = now.fetch_add(1, Ordering::SeqCst) + 1;
+                    most.fetch_max(own, Ordering::SeqCst);
+                    while most.load(Ordering::SeqCst) < wanted && Instant::now() < end {
+                        std::thread::yield_now();
+                    }
+                    now.fetch_sub(1, Ordering::SeqCst);
+                    Ok(sums_of(&piece, 1))
+                }
+            };
+            let all = reduced(reduce, pieces(count), at_once).await.unwrap();
+            assert_eq!(all.steps.len(), count as usize);
+            assert_eq!(most.load(Ordering::SeqCst), wanted, "{count} {at_once}");
+        }
+    }
+
+    #[tokio::test]
+    async fn an_error_ends_a_question_and_leaves_the_rest_undone() {
+        let begun = Arc::new(AtomicUsize::new(0));
+        let own = Arc::clone(&begun);
+        let third_fails = async move |piece: Piece| {
+            own.fetch_add(1, Ordering::SeqCst);
+            match piece.first_step {
+                2 => Err(failed()),
+                _ => Ok(sums_of(&piece, 1)),
+            }
+        };
+        let queue = PieceQueue(Mutex::new(pieces(10).into_iter()));
+        let told = queue.work_off(&third_fails).await.unwrap_err();
+        assert!(told.to_string().contains("cannot be read"), "{told}");
+        assert_eq!(begun.load(Ordering::SeqCst), 3);
+        assert!(queue.next().is_none(), "others would go on");
+    }
+
+    #[tokio::test]
+    async fn an_error_on_any_thread_is_that_of_the_question() {
+        for at_once in [1, 2, 5] {
+            for failing in [0, 1, 19] {
+                let reduce = async move |piece: Piece| {
+                    let part = sums_of(&piece, 1);
+                    (piece.first_step != failing)
+                        .then_some(part)
+                        .ok_or_else(failed)
+                };
+                let told = reduced(reduce, pieces(20), at_once).await;
+                assert!(told.is_err(), "piece {failing}, {at_once} at once");
+            }
+        }
+    }
+
+    #[tokio::test]
+    async fn sums_that_leave_their_range_are_an_error_and_end_it_too() {
+        let queue = PieceQueue(Mutex::new(
+            [pieces(1), pieces(1), pieces(1)].concat().into_iter(),
+        ));
+        let reduce = async |piece: Piece| Ok(sums_of(&piece, i128::MAX));
+        assert!(queue.work_off(&reduce).await.is_err());
+        assert!(queue.next().is_none(), "the rest is worked on");
+        let both = [pieces(1), pieces(1)].concat();
+        assert!(reduced(reduce, both, 2).await.is_err());
+    }
+
+    #[tokio::test]
+    async fn a_question_that_nobody_waits_for_leaves_the_rest_of_its_pieces_undone() {
+        let count = Arc::new(AtomicUsize::new(0));
+        let (begun, go_on) = (Arc::new(Notify::new()), Arc::new(Semaphore::new(0)));
+        // Gone with the last thread.
+        let (ended, has_ended) = oneshot::channel::<()>();
+        let reduce = {
+            let (count, begun, go_on) =
+                (Arc::clone(&count), Arc::clone(&begun), Arc::clone(&go_on));
+            async move |piece: Piece| {
+                assert!(!ended.is_closed());
+                count.fetch_add(1, Ordering::SeqCst);
+                begun.notify_one();
+                go_on.acquire().await.unwrap().forget();
+                Ok(sums_of(&piece, 1))
+            }
+        };
+        let mut asked = Box::pin(reduced(reduce, pieces(5), 1));
+        tokio::select! {
+            answer = &mut asked => panic!("it did not wait: {answer:?}"),
+            () = begun.notified() => {}
+        }
+        drop(asked);
+        go_on.add_permits(5);
+        let is_over = tokio::time::timeout(LIMIT, has_ended).await;
+        assert!(is_over.is_ok(), "its thread is still there");
+        assert_eq!(count.load(Ordering::SeqCst), 1, "the piece that it was at");
+    }
+}

@@ -230,7 +230,12 @@ impl Codes {
 #[expect(clippy::float_cmp, reason = "codes are exact numbers")]
 mod tests {
     use super::*;
+    use contract::digest::Digest;
     use contract::earth::Earth;
+    use contract::key::ObjectKey;
+    use contract::manifest::{MANIFEST_SCHEMA, Step};
+    use contract::quantity::Quantity;
+    use contract::time::Period;
 
     const GRID: Grid = Grid {
         rows: 4,
@@ -291,6 +296,92 @@ mod tests {
         assert_eq!(codes.text(), "1, 2, 3");
         codes.add(&(4..30).map(|code| code as f32).collect::<Vec<_>>());
         assert_eq!(codes.text(), "more than 20 others");
+    }
+
+    /// Three rows of chunks, the last one short.
+    const LARGE: Grid = Grid {
+        rows: 150,
+        cols: 130,
+        north_deg: 75.0,
+        west_deg: 0.0,
+        dlat_deg: 1.0,
+        dlon_deg: 1.0,
+    };
+
+    /// The version of a mask on that grid.
+    async fn landed(store: &Store, values: &[f32]) -> Manifest {
+        let product: ProductId = "basins".parse().unwrap();
+        let period = Period::year(2000).unwrap();
+        let field = fields::write(store, &product, &LARGE, values, period);
+        let digest = Digest::of(b"");
+        let step = Step {
+            masked: None,
+            period,
+            field: field.await.unwrap(),
+            raw_sha256: digest,
+            origin: "basins.nc".to_owned(),
+            valid_cells: 1,
+            contributed: None,
+        };
+        Manifest {
+            schema: MANIFEST_SCHEMA,
+            number: 1,
+            title: "Basins".to_owned(),
+            quantity: Quantity::open("basin", "1", "Basin").unwrap(),
+            synthetic: true,
+            source: String::new(),
+            grid: LARGE,
+            steps: vec![step],
+            domain: ObjectKey::domain(&product, &digest),
+            series: vec![],
+            derived_from: None,
+            computed: None,
+            notices: vec![],
+            product,
+        }
+    }
+
+    /// A square goes over the edge of a band, another code begins below it.
+    #[tokio::test]
+    async fn a_mask_that_is_read_in_bands_has_the_rows_and_regions_of_the_whole() {
+        let code = |cell: usize| match (cell / 130, cell % 130) {
+            (50..70, 20..40) => 1.0,
+            (125..150, 0..65) => 2.0,
+            (row, _) if row % 50 == 7 => f32::NAN,
+            _ => 0.0,
+        };
+        let values: Vec<f32> = (0..LARGE.cell_count()).map(code).collect();
+        let store = Store::memory();
+        let mask = landed(&store, &values).await;
+        for band_cells in [1, 1 << 30] {
+            let workshop = Workshop {
+                band_cells,
+                ..Workshop::of(&store)
+            };
+            let (mut rows, mut traced) = (vec![], Traced::of(1.0));
+            let taken = each_row(workshop, &mask, |row, own| {
+                rows.push((
+                    row,
+                    own.iter().map(|value| value.to_bits()).collect::<Vec<_>>(),
+                ));
+                traced.row(&LARGE, row, own);
+                Ok(())
+            });
+            taken.await.unwrap();
+            let bits: Vec<u32> = values.iter().map(|value| value.to_bits()).collect();
+            let whole = (0..).zip(bits.chunks_exact(130).map(<[u32]>::to_vec));
+            assert_eq!(rows, whole.collect::<Vec<_>>(), "{band_cells}");
+            traced.close(&LARGE, LARGE.rows, |_run| true);
+            let corners: Vec<_> = traced.found.into_iter().map(|own| own.outer).collect();
+            let square = vec![[20.0, 5.0], [40.0, 5.0], [40.0, 25.0], [20.0, 25.0]];
+            assert_eq!(corners, [square], "{band_cells}");
+        }
+        let all = regions(&store, &mask).await.unwrap();
+        let names: Vec<String> = all.into_iter().map(|own| own.name).collect();
+        let wanted = ["0", "1", "2"].map(|code| format!("{}:{code}", mask.id()));
+        assert_eq!(names, wanted);
+        let none = region(&store, &mask, 7.0).await.unwrap_err().to_string();
+        assert!(none.contains("there are 0, 1, 2"), "{none}");
     }
 
     #[test]

@@ -1,13 +1,17 @@
 //! What was exported, read by others: netCDF4 with its C library, GDAL by rasterio, Arrow for Python. Bit for bit.
 
+use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use arrow::array::{AsArray as _, RecordBatch};
+use arrow::datatypes::{Float32Type, Float64Type};
 use contract::grid::Grid;
 use contract::quantity::Quantity;
 use contract::time::Period;
 use cube::Description;
 use export::{ExportError, Format, create};
+use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use serde_json::{Value, json};
 
 /// Across the date line, with steps that are no round fraction of a degree.
@@ -199,4 +203,67 @@ fn the_same_values_are_the_same_bytes() {
             assert!(bytes(30) == bytes(rows), "{format:?} in bands of {rows}");
         }
     }
+}
+
+/// More rows than a chunk of NetCDF has, and more cells than rows of Parquet are made at a time.
+const LARGE: Grid = Grid {
+    rows: 1100,
+    cols: 1000,
+    north_deg: 55.0,
+    west_deg: -50.0,
+    dlat_deg: 0.1,
+    dlon_deg: 0.1,
+};
+
+/// Writes one step of that grid, in which each cell holds its index.
+fn large(format: Format, path: &Path) -> Vec<f32> {
+    let values: Vec<f32> = (0..LARGE.cell_count()).map(|cell| cell as f32).collect();
+    let description = Description {
+        grid: LARGE,
+        ..description(Quantity::CarbonFlux)
+    };
+    let mut written = create(format, path, &description, &periods()[..1]).unwrap();
+    let bands = values.chunks(420 * LARGE.cols as usize);
+    let mut bands = bands.map(<[f32]>::to_vec);
+    written.append(periods()[0], &mut bands).unwrap();
+    written.finish().unwrap();
+    values
+}
+
+#[test]
+fn a_netcdf_that_is_written_in_parts_has_each_of_them_in_its_place() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("out.nc");
+    let values = large(Format::NetCdf, &path);
+    let file = hdf5::File::open(&path).unwrap();
+    let found: Vec<f32> = file.dataset("carbon_flux").unwrap().read_raw().unwrap();
+    assert!(found == values, "a part lies elsewhere");
+}
+
+#[test]
+fn a_table_that_is_written_in_parts_has_the_place_of_each_cell() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("out.parquet");
+    let values = large(Format::Parquet, &path);
+    let (lat, lon) = cube::places(&LARGE);
+    let reader = ParquetRecordBatchReaderBuilder::try_new(File::open(&path).unwrap()).unwrap();
+    let mut cell = 0;
+    for batch in reader.build().unwrap() {
+        let batch: RecordBatch = batch.unwrap();
+        let places = [2, 3].map(|column| batch.column(column).as_primitive::<Float64Type>());
+        let found = batch.column(4).as_primitive::<Float32Type>();
+        for row in 0..batch.num_rows() {
+            let [own_lat, own_lon] = places.map(|place| place.value(row).to_bits());
+            let cols = LARGE.cols as usize;
+            assert_eq!(own_lat, lat.centres[cell / cols].to_bits(), "cell {cell}");
+            assert_eq!(own_lon, lon.centres[cell % cols].to_bits(), "cell {cell}");
+            assert_eq!(
+                found.value(row).to_bits(),
+                values[cell].to_bits(),
+                "cell {cell}"
+            );
+            cell += 1;
+        }
+    }
+    assert_eq!(cell, LARGE.cell_count());
 }

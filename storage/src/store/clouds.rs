@@ -229,6 +229,13 @@ fn retries(retry_limits: RetryLimits) -> RetryConfig {
 
 #[cfg(test)]
 mod tests {
+    use std::io::{BufRead as _, BufReader, Write as _};
+    use std::net::TcpListener;
+    use std::time::Duration;
+
+    use object_store::ObjectStoreExt as _;
+    use object_store::path::Path;
+
     use super::*;
 
     const SECRET: &str = "c2VjcmV0LXZhbHVl";
@@ -269,6 +276,66 @@ mod tests {
         let half = settings(&[("AWS_ACCESS_KEY_ID", "me")]).as_anybody();
         let reason = open(Cloud::S3, "bucket", &half).unwrap_err();
         assert!(reason.contains("AWS_SECRET_ACCESS_KEY"), "{reason}");
+    }
+
+    /// The head of the request for an object, as the endpoint of a store on this machine gets it; none if it gets none.
+    async fn requested(
+        with: impl FnOnce(Settings) -> Settings,
+        more: &[(&str, &str)],
+    ) -> Option<String> {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let endpoint = format!("http://{}", listener.local_addr().unwrap());
+        let own = [
+            ("AWS_ENDPOINT_URL", endpoint.as_str()),
+            ("AWS_ALLOW_HTTP", "true"),
+        ];
+        let store = open(
+            Cloud::S3,
+            "bucket",
+            &with(settings(&[&own[..], more].concat())),
+        )
+        .unwrap();
+        let (send, heads) = std::sync::mpsc::sync_channel(1);
+        let answering = std::thread::Builder::new().spawn(move || {
+            let (mut stream, _from) = listener.accept().unwrap();
+            let lines = BufReader::new(stream.try_clone().unwrap()).lines();
+            let lines = lines
+                .map_while(Result::ok)
+                .take_while(|line| !line.is_empty());
+            send.send(lines.collect::<Vec<_>>().join("\n")).unwrap();
+            let absent = "HTTP/1.1 404 Not Found\r\ncontent-length: 0\r\nconnection: close\r\n\r\n";
+            stream.write_all(absent.as_bytes()).unwrap();
+        });
+        drop(answering.unwrap());
+        let asked =
+            tokio::time::timeout(Duration::from_secs(20), store.get(&Path::from("key"))).await;
+        drop(asked);
+        heads
+            .try_recv()
+            .ok()
+            .map(|head: String| head.to_lowercase())
+    }
+
+    #[tokio::test]
+    async fn requests_are_signed_with_what_there_is_and_not_at_all_where_nothing_is() {
+        let keys = [
+            ("AWS_ACCESS_KEY_ID", "me"),
+            ("AWS_SECRET_ACCESS_KEY", SECRET),
+        ];
+        let signed = requested(|settings| settings, &keys).await.unwrap();
+        assert!(signed.starts_with("get /bucket/key "), "{signed}");
+        assert!(signed.contains("authorization: aws4-hmac"), "{signed}");
+        let signed = requested(Settings::as_anybody, &keys).await.unwrap();
+        assert!(
+            signed.contains("authorization:"),
+            "they are there: {signed}"
+        );
+        let told = [&keys[..], &[("AWS_SKIP_SIGNATURE", "true")]].concat();
+        for (more, what) in [(&[][..], "nothing is there"), (&told, "it is switched off")] {
+            let head = requested(Settings::as_anybody, more).await.expect(what);
+            assert!(head.starts_with("get /bucket/key "), "{head}");
+            assert!(!head.contains("authorization"), "{what}: {head}");
+        }
     }
 
     #[test]

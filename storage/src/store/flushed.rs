@@ -141,7 +141,7 @@ impl Flushes {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use std::sync::atomic::AtomicUsize;
     use std::sync::mpsc;
     use std::time::{Duration, Instant};
@@ -149,7 +149,7 @@ mod tests {
     use super::*;
 
     /// How often each folder was flushed since it is held, from the file's on up to the root.
-    fn counts(root: &Path, path: &Path) -> Vec<u64> {
+    pub(crate) fn counts(root: &Path, path: &Path) -> Vec<u64> {
         let folders = path.ancestors().skip(1);
         folders
             .take_while(|folder| folder.starts_with(root))
@@ -233,6 +233,32 @@ mod tests {
         }
         // What began before a name was there does not hold it.
         assert_eq!(ran.load(Ordering::SeqCst), 2);
+    }
+
+    /// While a first one runs two come, of whom one makes the next flush, which fails: that is no flush of the other one's.
+    #[test]
+    fn who_waited_for_a_flush_that_failed_makes_one_again() {
+        let (flushes, ran) = (Arc::new(Flushes::default()), Arc::new(AtomicUsize::new(0)));
+        let begin = || {
+            let (flushes, ran) = (Arc::clone(&flushes), Arc::clone(&ran));
+            let limit = Instant::now() + Duration::from_secs(30);
+            let wait = move || {
+                flushes.wait(|| match ran.fetch_add(1, Ordering::SeqCst) {
+                    0 => {
+                        while flushes.turns().waiting < 2 && Instant::now() < limit {
+                            std::thread::yield_now();
+                        }
+                        Ok(())
+                    }
+                    1 => Err(io::Error::from(io::ErrorKind::StorageFull)),
+                    _ => Ok(()),
+                })
+            };
+            std::thread::Builder::new().spawn(wait).unwrap()
+        };
+        let all = [begin(), begin(), begin()].map(|one| one.join().unwrap());
+        let failed = all.iter().filter(|one| one.is_err()).count();
+        assert_eq!((failed, ran.load(Ordering::SeqCst)), (1, 3));
     }
 
     #[test]

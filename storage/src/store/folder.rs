@@ -155,6 +155,7 @@ pub(super) fn failed(key: &ObjectKey, source: io::Error) -> object_store::Error 
 
 #[cfg(test)]
 mod tests {
+    use super::super::flushed::tests::counts;
     use super::*;
 
     #[tokio::test]
@@ -184,6 +185,25 @@ mod tests {
         assert_eq!(fs::read(folder.path().join("a/b")).unwrap(), b"over");
         let left = fs::read_dir(folder.path().join("a")).unwrap().count();
         assert_eq!(left, 4, "the object and the three files that were there");
+    }
+
+    /// A name that lasts: also where somebody else made it and may not have flushed it.
+    #[tokio::test]
+    async fn the_folder_of_each_name_that_is_made_is_flushed() {
+        let folder = tempfile::tempdir().unwrap();
+        let root = folder.path();
+        let path = root.join("a/b");
+        let content = || Content::Bytes("content".into());
+        let key = || "a/b".parse::<ObjectKey>().unwrap();
+        create(root.to_owned(), key(), content()).await.unwrap();
+        assert_eq!(counts(root, &path), [1, 1]);
+        let again = create(root.to_owned(), key(), content()).await;
+        assert!(again.is_err(), "it is there");
+        assert_eq!(counts(root, &path), [2, 1]);
+        replace(root.to_owned(), key(), content()).await.unwrap();
+        assert_eq!(counts(root, &path), [3, 1]);
+        replace_now(root, &path, b"other").unwrap();
+        assert_eq!(counts(root, &path), [4, 1]);
     }
 
     #[tokio::test]

@@ -114,3 +114,24 @@ fn parts_of_a_trend_are_those_of_the_whole_of_series_that_share_their_steps() {
         why.to_string().replace("a test for a trend", "a trend")
     );
 }
+
+/// Months that a product lacks, as a series of its steps has them, beside the same months without data.
+#[test]
+fn steps_that_are_missing_are_steps_without_data() {
+    let all = months(120);
+    let is_missing = |m: usize| m % 9 == 4 || (40..46).contains(&m);
+    // What goes on from month to month, so that it matters which ones are next to one another.
+    let value = |m: usize| {
+        let (slow, quick) = ((m as f64 / 4.0).sin(), ((m * m) % 7) as f64);
+        rising(120)[m] + 2.0 * slow + 0.1 * quick
+    };
+    let with_gaps: Vec<f64> = (0..120)
+        .map(|m| if is_missing(m) { f64::NAN } else { value(m) })
+        .collect();
+    let here = (0..120usize).filter(|m| !is_missing(*m));
+    let (periods, values): (Vec<Period>, Vec<f64>) = here.map(|m| (all[m], value(m))).unzip();
+    let expected = trend(&all, &with_gaps, TimeStep::Native, "").unwrap();
+    let found = trend(&periods, &values, TimeStep::Native, "").unwrap();
+    assert_eq!(found.count, values.len() as u64);
+    assert_eq!(found, expected);
+}
