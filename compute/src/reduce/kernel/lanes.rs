@@ -45,20 +45,6 @@ pub(super) struct ByStep<'a> {
     pub(super) squares: &'a mut [i64],
 }
 
-/// Adds the values of cells; is one among them that cannot be summed? Then the sums say nothing.
-pub(super) fn add(cells: EqualCells<'_>, steps: Steps, to: &mut ByStep<'_>) -> bool {
-    #[cfg(target_arch = "x86_64")]
-    #[expect(unsafe_code, reason = "the processor has what it is compiled for")]
-    match Lanes::of_this_processor() {
-        // SAFETY: the processor was asked.
-        Lanes::Eight => return unsafe { add_avx512(cells, steps, to) },
-        // SAFETY: as above.
-        Lanes::Four => return unsafe { add_avx2(cells, steps, to) },
-        Lanes::Any => {}
-    }
-    add_any(cells, steps, to)
-}
-
 /// How many numbers a processor takes at a time.
 #[cfg(target_arch = "x86_64")]
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -85,16 +71,43 @@ impl Lanes {
     }
 }
 
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx512f,avx512dq,avx512vl")]
-fn add_avx512(cells: EqualCells<'_>, steps: Steps, to: &mut ByStep<'_>) -> bool {
-    add_any(cells, steps, to)
+/// Makes a function of what this processor can run of three compilations of a body that is inlined into each.
+macro_rules! by_processor {
+    (
+        $(#[$said:meta])*
+        fn $name:ident($($given:ident: $of:ty),* $(,)?) $(-> $told:ty)? = $any:ident, $avx2:ident, $avx512:ident
+    ) => {
+        $(#[$said])*
+        pub(super) fn $name($($given: $of),*) $(-> $told)? {
+            #[cfg(target_arch = "x86_64")]
+            #[expect(unsafe_code, reason = "the processor has what it is compiled for")]
+            match Lanes::of_this_processor() {
+                // SAFETY: the processor was asked.
+                Lanes::Eight => return unsafe { $avx512($($given),*) },
+                // SAFETY: as above.
+                Lanes::Four => return unsafe { $avx2($($given),*) },
+                Lanes::Any => {}
+            }
+            $any($($given),*)
+        }
+
+        #[cfg(target_arch = "x86_64")]
+        #[target_feature(enable = "avx512f,avx512dq,avx512vl")]
+        fn $avx512($($given: $of),*) $(-> $told)? {
+            $any($($given),*)
+        }
+
+        #[cfg(target_arch = "x86_64")]
+        #[target_feature(enable = "avx2")]
+        fn $avx2($($given: $of),*) $(-> $told)? {
+            $any($($given),*)
+        }
+    };
 }
 
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-fn add_avx2(cells: EqualCells<'_>, steps: Steps, to: &mut ByStep<'_>) -> bool {
-    add_any(cells, steps, to)
+by_processor! {
+    /// Adds the values of cells; is one among them that cannot be summed? Then the sums say nothing.
+    fn add(cells: EqualCells<'_>, steps: Steps, to: &mut ByStep<'_>) -> bool = add_any, add_avx2, add_avx512
 }
 
 /// Steps that are added at once: their sums are in registers while cell after cell comes.
@@ -165,30 +178,9 @@ pub(super) struct Weighed<'a> {
 /// What a cell weighs, and what coverage counts besides that.
 pub(super) type WeightExtra = [i64; 2];
 
-/// Adds how many values there are times what each of them weighs, and what coverage counts besides.
-pub(super) fn add_counts(counts: &[i64], own: WeightExtra, to: &mut Weighed<'_>) {
-    #[cfg(target_arch = "x86_64")]
-    #[expect(unsafe_code, reason = "the processor has what it is compiled for")]
-    match Lanes::of_this_processor() {
-        // SAFETY: the processor was asked.
-        Lanes::Eight => return unsafe { add_counts_avx512(counts, own, to) },
-        // SAFETY: as above.
-        Lanes::Four => return unsafe { add_counts_avx2(counts, own, to) },
-        Lanes::Any => {}
-    }
-    add_counts_any(counts, own, to);
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx512f,avx512dq,avx512vl")]
-fn add_counts_avx512(counts: &[i64], own: WeightExtra, to: &mut Weighed<'_>) {
-    add_counts_any(counts, own, to);
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-fn add_counts_avx2(counts: &[i64], own: WeightExtra, to: &mut Weighed<'_>) {
-    add_counts_any(counts, own, to);
+by_processor! {
+    /// Adds how many values there are times what each of them weighs, and what coverage counts besides.
+    fn add_counts(counts: &[i64], own: WeightExtra, to: &mut Weighed<'_>) = add_counts_any, add_counts_avx2, add_counts_avx512
 }
 
 #[expect(clippy::inline_always, reason = "it is compiled several times")]
@@ -218,45 +210,14 @@ pub(super) struct Products<'a> {
     pub(super) high: &'a mut [i64],
 }
 
-/// Adds the values of one cell times its weight; is one among them that cannot be summed? Then the sums say nothing.
-pub(super) fn add_products(
-    values: &[f32],
-    steps: Steps,
-    own: WeightExtra,
-    to: (&mut Weighed<'_>, &mut Products<'_>),
-) -> bool {
-    #[cfg(target_arch = "x86_64")]
-    #[expect(unsafe_code, reason = "the processor has what it is compiled for")]
-    match Lanes::of_this_processor() {
-        // SAFETY: the processor was asked.
-        Lanes::Eight => return unsafe { add_products_avx512(values, steps, own, to) },
-        // SAFETY: as above.
-        Lanes::Four => return unsafe { add_products_avx2(values, steps, own, to) },
-        Lanes::Any => {}
-    }
-    add_products_any(values, steps, own, to)
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx512f,avx512dq,avx512vl")]
-fn add_products_avx512(
-    values: &[f32],
-    steps: Steps,
-    own: WeightExtra,
-    to: (&mut Weighed<'_>, &mut Products<'_>),
-) -> bool {
-    add_products_any(values, steps, own, to)
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-fn add_products_avx2(
-    values: &[f32],
-    steps: Steps,
-    own: WeightExtra,
-    to: (&mut Weighed<'_>, &mut Products<'_>),
-) -> bool {
-    add_products_any(values, steps, own, to)
+by_processor! {
+    /// Adds the values of one cell times its weight; is one among them that cannot be summed? Then the sums say nothing.
+    fn add_products(
+        values: &[f32],
+        steps: Steps,
+        own: WeightExtra,
+        to: (&mut Weighed<'_>, &mut Products<'_>),
+    ) -> bool = add_products_any, add_products_avx2, add_products_avx512
 }
 
 #[expect(clippy::inline_always, reason = "it is compiled several times")]
