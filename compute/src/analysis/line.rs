@@ -157,6 +157,10 @@ mod tests {
         assert_eq!(line.places, [0, 1, 3]);
         let spread = line.spread(&[1.0, 2.0, 4.0]);
         assert!(spread[2].is_nan() && (spread[3] - 4.0).abs() < 1e-15);
+        // Two that are missing are two, not one gap.
+        let with_holes = with_holes(&[month(0), month(3)], &[1.0, 4.0]);
+        let are_there = with_holes.iter().map(|value| !value.is_nan());
+        assert_eq!(are_there.collect::<Vec<_>>(), [true, false, false, true]);
     }
 
     #[test]

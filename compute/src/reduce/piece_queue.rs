@@ -101,6 +101,8 @@ mod tests {
 
     /// Time after which a test that waits has failed.
     const LIMIT: Duration = Duration::from_secs(30);
+    /// Time for a thread too many to come.
+    const TOO_MANY: Duration = Duration::from_millis(300);
 
     /// So many pieces, each of a step of its own.
     fn pieces(count: u32) -> Vec<Piece> {
@@ -157,11 +159,15 @@ mod tests {
         for (count, at_once, wanted) in [(12, 3, 3), (12, 1, 1), (2, 8, 2)] {
             let (now, most) = (Arc::new(AtomicUsize::new(0)), Arc::new(AtomicUsize::new(0)));
             let reduce = {
-                let (most, end) = (Arc::clone(&most), Instant::now() + LIMIT);
+                let (most, begun) = (Arc::clone(&most), Instant::now());
                 async move |piece: Piece| {
                     let own = now.fetch_add(1, Ordering::SeqCst) + 1;
                     most.fetch_max(own, Ordering::SeqCst);
-                    while most.load(Ordering::SeqCst) < wanted && Instant::now() < end {
+                    let is_held = || match most.load(Ordering::SeqCst) {
+                        most if most < wanted => begun.elapsed() < LIMIT,
+                        most => most == wanted && begun.elapsed() < TOO_MANY,
+                    };
+                    while is_held() {
                         std::thread::yield_now();
                     }
                     now.fetch_sub(1, Ordering::SeqCst);
