@@ -297,6 +297,18 @@ mod tests {
             other.get(&key).await.unwrap(),
             store.get(&key).await.unwrap()
         );
+        // Rows that end within a chunk.
+        let band = |rows: usize| Contributed {
+            steps: counts.steps[..rows * cols].to_vec(),
+            milliseconds: counts.milliseconds[..rows * cols].to_vec(),
+            ..counts
+        };
+        let mut part = Spooled::one_of(1, folder, &GRID, head).unwrap();
+        let told = part.band(&band(30)).unwrap_err().to_string();
+        assert!(told.contains("do not fit 70 x 130"), "{told}");
+        let mut reader = Reader::open(&store, &key, &GRID).await.unwrap();
+        let told = reader.rows(30).unwrap_err().to_string();
+        assert!(told.contains("30 rows from 0 on"), "{told}");
         let few = Spooled::one_of(1, folder, &GRID, head).unwrap();
         assert!(few.put(&other, &product).await.is_err(), "rows are missing");
     }

@@ -194,6 +194,31 @@ pub(super) mod tests {
         assert!(own.lasts.load(Ordering::Acquire));
     }
 
+    /// A device in its place, which cannot be flushed.
+    #[test]
+    fn a_folder_lasts_only_when_those_above_it_are_flushed() {
+        let root = tempfile::tempdir().unwrap();
+        let path = root.path().join("a/b/one");
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(&path, "content").unwrap();
+        let above = root.path().join("a");
+        let unwilling = Folder {
+            file: File::open("/dev/null").unwrap(),
+            identity: identity(&fs::metadata(&above).unwrap()),
+            lasts: AtomicBool::new(false),
+            flushes: Flushes::default(),
+        };
+        let key = (root.path().to_owned(), above);
+        all().insert(key.clone(), Arc::new(unwilling));
+        assert!(flush(root.path(), &path).is_err());
+        let own = held(root.path(), path.parent().unwrap()).unwrap();
+        assert_eq!(own.flushes.turns().done, 1, "it was flushed itself");
+        assert!(!own.lasts.load(Ordering::Acquire));
+        all().remove(&key);
+        flush(root.path(), &path).unwrap();
+        assert!(own.lasts.load(Ordering::Acquire));
+    }
+
     #[test]
     fn one_flush_serves_all_who_waited_for_it_and_nobody_who_came_after_its_beginning() {
         const WAITING: usize = 5;

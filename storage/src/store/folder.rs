@@ -206,6 +206,20 @@ mod tests {
         assert_eq!(counts(root, &path), [4, 1]);
     }
 
+    /// A device in its place, which cannot be flushed.
+    #[test]
+    fn a_file_has_no_name_before_its_content_is_flushed() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a");
+        let fill = |file: &mut File| {
+            *file = OpenOptions::new().write(true).open("/dev/null")?;
+            file.write_all(b"content")
+        };
+        assert!(write(&path, fill, |from, to| fs::rename(from, to)).is_err());
+        let left = fs::read_dir(folder.path()).unwrap().count();
+        assert_eq!(left, 0, "neither the object nor what it was written to");
+    }
+
     #[tokio::test]
     async fn a_file_in_the_place_of_a_folder_is_an_error() {
         let folder = tempfile::tempdir().unwrap();
