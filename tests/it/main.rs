@@ -18,6 +18,7 @@ mod interop;
 mod logged;
 mod migrate;
 mod quality;
+mod recipe;
 mod reread;
 mod same_answers;
 mod sea;
