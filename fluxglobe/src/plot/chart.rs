@@ -1,5 +1,7 @@
 //! A chart of values against time: its axes, lines that break at gaps, and bands.
 
+use std::ops::Range;
+
 use contract::analysis::SeriesAnalysis;
 use contract::cited::Cited;
 use contract::time::{Period, TimeMs};
@@ -61,7 +63,7 @@ pub(super) fn axis_of(points: &[Point]) -> TimeAxis {
 pub(super) fn chart<'a, 'b>(
     area: &'a Area<'b>,
     axis: &TimeAxis,
-    values: std::ops::Range<f64>,
+    values: Range<f64>,
     label: &str,
 ) -> Result<Chart<'a, 'b>, Failed> {
     let mut chart = ChartBuilder::on(area)
@@ -124,6 +126,17 @@ pub(super) fn band(
         }
     }
     Ok(())
+}
+
+/// Values with room above them for a legend of so many lines: it would hide what lies behind it.
+pub(super) fn below_legend(values: Range<f64>, line_count: usize) -> Range<f64> {
+    // Shares of a chart's height: a line's, of what is around all of them, and the largest.
+    const LINE: f64 = 0.05;
+    const AROUND: f64 = 0.04;
+    const MOST: f64 = 0.5;
+    let share = (AROUND + LINE * line_count as f64).min(MOST);
+    let room = (values.end - values.start) * share / (1.0 - share);
+    values.start..values.end + room
 }
 
 /// What the lines are, in the upper left corner.

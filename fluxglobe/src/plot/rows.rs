@@ -4,7 +4,9 @@ use anyhow::{Result, bail};
 use contract::statistics::{Statistic, StatisticsAnswer, StatisticsRow};
 use plotters::prelude::{Color as _, LineSeries, PathElement};
 
-use super::chart::{Point, axis_of, band, chart, label, legend, lines, named, period};
+use super::chart::{
+    Point, axis_of, band, below_legend, chart, label, legend, lines, named, period,
+};
 use super::page::{self, COLOURS, Words, range};
 
 pub(super) fn of_statistics(answer: &StatisticsAnswer) -> Result<String> {
@@ -60,6 +62,7 @@ pub(super) fn of_statistics(answer: &StatisticsAnswer) -> Result<String> {
         let axis = axis_of(&mean);
         let lines_of = drawn.iter().map(|(_, points)| points).chain([&low, &high]);
         let values = range(lines_of.flatten().filter_map(|(_, value)| *value));
+        let values = below_legend(values, drawn.len());
         let mut chart = chart(area, &axis, values, &label(cited))?;
         band(&mut chart, &axis, &low, &high)?;
         for ((name, points), colour) in drawn.iter().zip(COLOURS) {

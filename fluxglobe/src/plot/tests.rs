@@ -60,20 +60,25 @@ fn a_climatology_is_a_line_of_means_in_a_band_of_spreads() {
     );
 }
 
-#[test]
-fn a_trend_is_its_values_two_lines_and_their_bands() {
+/// Ten years of months with these values, whatever the lines through them.
+fn trend_of(of: impl Fn(u32) -> f64) -> Value {
     let value = |index: u32| {
         let (start, end) = month(index);
-        json!({"start": start, "end": end, "value": f64::from(index) / 100.0})
+        json!({"start": start, "end": end, "value": of(index)})
     };
     let values: Vec<Value> = (0..120).map(value).collect();
-    let made = json!({"slope_unit": "°C per decade", "step": "month", "deseasonalised": true, "count": 120,
+    json!({"slope_unit": "°C per decade", "step": "month", "deseasonalised": true, "count": 120,
         "years": 10.0, "mid": "2006-01-01T00:00:00Z", "mean": 0.6,
         "least_squares": {"slope_per_decade": 1.2, "standard_error_per_decade": 0.1, "lower_per_decade": 1.0,
             "upper_per_decade": 1.4, "p_value": 1e-9, "lag1_autocorrelation": 0.1, "effective_count": 100.0},
         "theil_sen": {"slope_per_decade": 1.2, "lower_per_decade": 1.1, "upper_per_decade": 1.3, "at_mid": 0.6},
         "mann_kendall": {"score": 7000, "tau": 0.99, "variance_correction": 1.0, "z": 9.0, "p_value": 0.02},
-        "values": values});
+        "values": values})
+}
+
+#[test]
+fn a_trend_is_its_values_two_lines_and_their_bands() {
+    let made = trend_of(|index| f64::from(index) / 100.0);
     let svg = of_analysis(&analysis("trend", made)).unwrap();
     is_told(&svg);
     for text in [
@@ -85,6 +90,28 @@ fn a_trend_is_its_values_two_lines_and_their_bands() {
         assert!(svg.contains(text), "{text}: {svg}");
     }
     assert_eq!(svg.matches("<polygon").count(), 2);
+}
+
+/// The highest value is the first one, in the corner of the legend.
+#[test]
+fn a_legend_hides_no_value() {
+    let made = trend_of(|index| 1.2 - f64::from(index) / 100.0);
+    let svg = of_analysis(&analysis("trend", made)).unwrap();
+    let number = |line: &str, name: &str| -> f64 {
+        let (_, rest) = line.split_once(&format!(" {name}=\"")).unwrap();
+        rest.split('"').next().unwrap().parse().unwrap()
+    };
+    let dots = svg.lines().filter(|line| line.starts_with("<circle"));
+    let highest = dots.map(|line| number(line, "cy")).fold(f64::MAX, f64::min);
+    // The box behind the legend is the last rectangle before its words.
+    let (before, _words) = svg.split_once("Theil-Sen").unwrap();
+    let behind = before
+        .lines()
+        .filter(|line| line.starts_with("<rect"))
+        .next_back();
+    let behind = behind.unwrap();
+    let bottom = number(behind, "y") + number(behind, "height");
+    assert!(bottom < highest, "{behind}: {highest}");
 }
 
 #[test]

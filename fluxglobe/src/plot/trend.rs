@@ -5,7 +5,7 @@ use contract::analysis::{SeriesAnalysis, Trend};
 use contract::time::TimeMs;
 use plotters::prelude::{Color as _, LineSeries, PathElement, Polygon, RGBColor};
 
-use super::chart::{Point, axis_of, chart, label, legend, lines, period, place};
+use super::chart::{Point, axis_of, below_legend, chart, label, legend, lines, period, place};
 use super::page::{self, Area, COLOURS, Failed, Words, range};
 
 /// Of the values that a trend is drawn through: the first colour, half of it.
@@ -86,6 +86,7 @@ fn drawn_trend(area: &Area<'_>, answer: &SeriesAnalysis, trend: &Trend) -> Resul
         },
     ];
     let values = range(points.iter().filter_map(|(_, value)| *value));
+    let values = below_legend(values, lines_of.len());
     let mut chart = chart(area, &axis, values, &label(&answer.cited))?;
     lines(&mut chart, &axis, &points, PALE)?;
     let (first, last) = (points[0].0.mid(), points[points.len() - 1].0.mid());
