@@ -158,9 +158,9 @@ mod tests {
         let spread = line.spread(&[1.0, 2.0, 4.0]);
         assert!(spread[2].is_nan() && (spread[3] - 4.0).abs() < 1e-15);
         // Two that are missing are two, not one gap.
-        let with_holes = with_holes(&[month(0), month(3)], &[1.0, 4.0]);
-        let are_there = with_holes.iter().map(|value| !value.is_nan());
-        assert_eq!(are_there.collect::<Vec<_>>(), [true, false, false, true]);
+        let with_holes = with_holes(&[0, 1, 4].map(month), &[1.0, 2.0, 5.0]);
+        let are_there: Vec<bool> = with_holes.iter().map(|value| !value.is_nan()).collect();
+        assert_eq!(are_there, [true, true, false, false, true]);
     }
 
     #[test]
