@@ -105,11 +105,8 @@ fn a_legend_hides_no_value() {
     let highest = dots.map(|line| number(line, "cy")).fold(f64::MAX, f64::min);
     // The box behind the legend is the last rectangle before its words.
     let (before, _words) = svg.split_once("Theil-Sen").unwrap();
-    let behind = before
-        .lines()
-        .filter(|line| line.starts_with("<rect"))
-        .next_back();
-    let behind = behind.unwrap();
+    let mut lines = before.lines();
+    let behind = lines.rfind(|line| line.starts_with("<rect")).unwrap();
     let bottom = number(behind, "y") + number(behind, "height");
     assert!(bottom < highest, "{behind}: {highest}");
 }
