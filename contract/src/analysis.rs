@@ -1,6 +1,7 @@
 //! What is made of series: climatology, anomaly, trend, season, extremes; correlation of two; latitude or longitude against
 //! time; differences. Questions and answers, the same on the command line and over HTTP.
 
+mod along_line;
 mod base;
 mod bins;
 mod climatology;
@@ -28,6 +29,7 @@ use crate::series::{Cell, RegionSeriesQuery};
 use crate::statistics::MinCoverage;
 use crate::time::{TimeMs, TimeStep};
 
+pub use along_line::LineSeriesQuery;
 pub use base::BasePeriod;
 pub use bins::CalendarBins;
 pub use climatology::{Anomalies, AnomalyRow, Climatology, ClimatologyRow};
@@ -112,7 +114,7 @@ pub struct AnalysisOptions {
     pub bins: CalendarBins,
     /// Means that a trend is drawn through.
     pub trend_step: TimeStep,
-    /// Least share of a region's sea that a step must hold data over; those with less are left out.
+    /// Least share of a region's sea, or of a line, that a step must hold data over; those with less are left out.
     pub min_coverage: MinCoverage,
 }
 
@@ -157,6 +159,8 @@ pub enum SeriesQuery {
     },
     /// Of the mean over a region.
     Region(RegionSeriesQuery),
+    /// Of the mean along a line.
+    Line(LineSeriesQuery),
 }
 
 impl SeriesQuery {
@@ -165,6 +169,7 @@ impl SeriesQuery {
         match self {
             Self::Cell { product, .. } => product,
             Self::Region(query) => &query.product,
+            Self::Line(query) => &query.product,
         }
     }
 
@@ -173,6 +178,7 @@ impl SeriesQuery {
         match self {
             Self::Cell { from, to, .. } => (*from, *to),
             Self::Region(query) => (query.from, query.to),
+            Self::Line(query) => (query.from, query.to),
         }
     }
 
@@ -183,6 +189,7 @@ impl SeriesQuery {
         match &mut query {
             Self::Cell { product, .. } => *product = other,
             Self::Region(query) => query.product = other,
+            Self::Line(query) => query.product = other,
         }
         query
     }
@@ -207,6 +214,7 @@ impl SeriesQuery {
                 ..
             } => (*own_from, *own_to) = (from, to),
             Self::Region(query) => (query.from, query.to) = (from, to),
+            Self::Line(query) => (query.from, query.to) = (from, to),
         }
         query
     }
@@ -215,11 +223,15 @@ impl SeriesQuery {
 /// What a series is of.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct SeriesPlace {
-    /// The region that it is the mean over; none of a cell.
+    /// The region that it is the mean over; none of a cell or a line.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub region: Option<String>,
-    /// The cell; none of a region.
+    /// The line that it is the mean along; none of a cell or a region.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub line: Option<String>,
+    /// The cell; none of a region or a line.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub cell: Option<Cell>,
@@ -251,13 +263,13 @@ pub struct SeriesAnalysis {
     pub step_count: u64,
     /// Steps of them that hold data and were not left out.
     pub value_count: u64,
-    /// Least share of a region's sea that a step had to hold data over, percent.
+    /// Least share of a region's sea, or of a line, that a step had to hold data over, percent.
     #[serde(default)]
     pub min_coverage_percent: f64,
     /// Steps that hold data over less than that, and were left out.
     #[serde(default)]
     pub left_out_count: u64,
-    /// What may surprise: how the region was taken, steps that cover little of it or were left out, steps without data.
+    /// What may surprise: how the region or line was taken, steps that cover little of it or were left out, steps without data.
     pub notes: Vec<String>,
     /// What was asked for and cannot be said, and why.
     pub refused: Vec<Refused>,

@@ -9,7 +9,7 @@ use crate::ContractError;
 use crate::grid::{LonLatDeg, rounded_deg};
 use crate::region::{AskedRegion, Region};
 
-pub use line::{Line, MAX_VERTICES};
+pub use line::{AskedLine, Line, MAX_VERTICES};
 
 /// How the value at a point is made.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash, Serialize, ToSchema)]
@@ -80,7 +80,7 @@ impl Geometry {
 pub struct AskedGeometry {
     /// Its shape.
     pub geometry: Geometry,
-    /// Its name, or the text or file that it was asked for with.
+    /// Its name, or the text or file that it was asked for with; of a long text its digest.
     pub name: String,
 }
 
@@ -98,10 +98,16 @@ impl AskedGeometry {
     /// # Errors
     /// As of [`Line`].
     pub fn line(text: &str) -> Result<Self, ContractError> {
-        Ok(Self {
-            geometry: Geometry::Line(text.parse()?),
-            name: text.to_owned(),
-        })
+        Ok(text.parse::<AskedLine>()?.into())
+    }
+}
+
+impl From<AskedLine> for AskedGeometry {
+    fn from(asked: AskedLine) -> Self {
+        Self {
+            geometry: Geometry::Line(asked.line),
+            name: asked.name,
+        }
     }
 }
 

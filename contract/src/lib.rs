@@ -23,6 +23,7 @@ pub mod event;
 mod exact;
 pub mod flow;
 pub mod geometry;
+pub mod geometry_text;
 pub mod grid;
 pub mod heights;
 pub mod isolines;

@@ -13,7 +13,6 @@ pub use asked::AskedRegion;
 pub use cells::Cells;
 pub use collection::{MAX_REGIONS, named_regions};
 pub use named::{NAMED_REGIONS, NamedRegion};
-pub use text::MAX_TEXT_BYTES;
 
 /// Most corners a region's polygons may have together.
 pub const MAX_CORNERS: usize = 1_000_000;

@@ -77,7 +77,7 @@ impl Analyst {
     fn reader(&self, series: &SeriesQuery) -> &Engine {
         match series {
             SeriesQuery::Cell { .. } => &self.local,
-            SeriesQuery::Region(_) => &self.regions,
+            SeriesQuery::Region(_) | SeriesQuery::Line(_) => &self.regions,
         }
     }
 }

@@ -212,6 +212,16 @@ fn refused_alike(data: &Path, server: &Server) {
 
 /// The same of climatologies, correlations, differences and bands.
 fn made_of_series(data: &Path, server: &Server) {
+    let track = r#"{"type":"LineString","coordinates":[[-40,10],[-10,40]]}"#;
+    let drawn = (
+        format!(
+            "stats line --product flux --line {track} --season --extremes --from 2000-02 --earth sphere"
+        ),
+        format!(
+            "flux/analysis?line={}&parts=season,extremes&from=2000-02&earth=sphere",
+            escaped(track)
+        ),
+    );
     for (words, path) in [
         (
             "stats polygon --product flux --region 14n-50n --climatology --anomaly --trend --extremes",
@@ -220,6 +230,19 @@ fn made_of_series(data: &Path, server: &Server) {
         (
             "stats point --product flux --lon 181.3 --lat -4.1 --climatology --base 2000/2001 --bins season",
             "flux/analysis?lon=181.3&lat=-4.1&parts=climatology&base=2000/2001&bins=season",
+        ),
+        (
+            "stats line --product flux --line 170,-20;-170.5,33.3;10,80 --climatology --anomaly --trend --extremes --min-coverage 20",
+            "flux/analysis?line=170,-20;-170.5,33.3;10,80&parts=climatology,anomaly,trend,extremes&min_coverage=20",
+        ),
+        (&drawn.0, &drawn.1),
+        (
+            "stats correlate --product flux --product flux-accumulated --line -40,10;-10,40 --max-lag 1",
+            "flux/correlation?with=flux-accumulated&line=-40,10;-10,40&max_lag=1",
+        ),
+        (
+            "stats difference --product flux --line -40,10;-10,40 --period 2000/2000 --minus-period 1999/2001",
+            "flux/difference?line=-40,10;-10,40&period=2000/2000&minus_period=1999/2001",
         ),
         (
             "stats correlate --product flux --product flux-accumulated --region 14n-50n --max-lag 1",
@@ -240,6 +263,37 @@ fn made_of_series(data: &Path, server: &Server) {
         assert_eq!(served.status, 200, "{path}: {}", served.text());
         assert_eq!(served.json().unwrap(), printed, "{path}");
     }
+    analysed_as_told(data);
+}
+
+/// What is analysed along a line is its mean as it is told at every step.
+fn analysed_as_told(data: &Path) {
+    let line = ["stats", "line", "--product", "flux", "--line"];
+    let of = |more: &[&str]| {
+        let words = [&line[..], &["-40,10;-10,40;60,-30"], more, &["--json"]].concat();
+        program::json(data, &words).unwrap()
+    };
+    let told = of(&["--statistic", "mean", "--step", "native"]);
+    let analysed = of(&["--anomaly"]);
+    assert_eq!(analysed["line"], told["geometry"]);
+    assert_eq!(
+        (&analysed["region"], &analysed["cell"]),
+        (&Value::Null, &Value::Null)
+    );
+    let told = told["rows"].as_array().unwrap();
+    let found = analysed["anomaly"]["rows"].as_array().unwrap();
+    assert_eq!((told.len(), found.len()), (3, 3));
+    for (told, found) in told.iter().zip(found) {
+        assert_eq!(
+            (&told["start"], &told["end"]),
+            (&found["start"], &found["end"])
+        );
+        assert!(found["value"].is_number(), "{found}");
+        assert_eq!(told["values"]["mean"], found["value"]);
+    }
+    let words = [&line[..], &["0,0;1,1", "--trend", "--statistic", "max"]].concat();
+    let refused = program::fail(data, &words).unwrap();
+    assert!(refused.contains("leave --statistic"), "{refused}");
 }
 
 #[test]

@@ -5,14 +5,15 @@ use contract::cited::Cited;
 use contract::manifest::{Manifest, ManifestId};
 use contract::quantity::Quantity;
 use contract::series::RegionValue;
-use contract::statistics::MinCoverage;
+use contract::statistics::{MinCoverage, Statistic, StatisticsAnswer};
 use contract::time::Period;
 
 use crate::point::point_series_of;
+use crate::reduce::statistics_of;
 use crate::stats::region_series_of;
 use crate::{ComputeError, Engine};
 
-/// Share of a region's sea below which a step is told of, percent.
+/// Share of a region's sea, or of a line, below which a step is told of, percent.
 const LITTLE_PERCENT: f64 = 50.0;
 
 /// A version of a product with its name, which is costly to compute.
@@ -27,7 +28,7 @@ pub(crate) struct ReadSeries {
     pub(crate) periods: Vec<Period>,
     /// Beside them, in the unit that people read, NaN no data.
     pub(crate) values: Vec<f64>,
-    /// Steps that hold data over less of a region than asked for: they are NaN.
+    /// Steps that hold data over less of a region or line than asked for: they are NaN.
     pub(crate) left_out: usize,
     pub(crate) notes: Vec<String>,
 }
@@ -46,28 +47,27 @@ impl ReadSeries {
         }
     }
 
-    /// Means over a region, without those over less of its sea than `least`.
-    fn take_means(&mut self, series: &[RegionValue], least: MinCoverage) {
+    /// Means over something, without those over less of it than `least`; `of_what` is what coverage is a share of.
+    fn take_means(&mut self, series: &[CoveredMean], least: MinCoverage, of_what: &str) {
         let (all, mut little) = (series.len(), 0);
         for step in series {
-            let (start, end) = (step.start, step.end);
             let is_out = step.mean.is_some() && step.coverage_percent < least.percent();
             let mean = step.mean.filter(|_mean| !is_out);
-            self.periods.push(Period { start, end });
+            self.periods.push(step.period);
             self.values.push(mean.unwrap_or(f64::NAN));
             self.left_out += usize::from(is_out);
             little += usize::from(mean.is_some() && step.coverage_percent < LITTLE_PERCENT);
         }
         if self.left_out > 0 {
             self.notes.push(format!(
-                "{} of {all} steps hold data over less than {} % of the region's sea and are left out",
+                "{} of {all} steps hold data over less than {} % of the {of_what} and are left out",
                 self.left_out,
                 least.percent()
             ));
         }
         if little > 0 {
             self.notes.push(format!(
-                "{little} of {all} steps hold data over less than half of the region's sea; each counts as much as the others"
+                "{little} of {all} steps hold data over less than half of the {of_what}; each counts as much as the others"
             ));
         }
     }
@@ -87,10 +87,39 @@ impl ReadSeries {
     }
 }
 
-/// The series of a version of a product, without steps that hold data over less of a region's sea than `least`.
+/// The mean of a step, and how much it is a mean of.
+struct CoveredMean {
+    period: Period,
+    mean: Option<f64>,
+    coverage_percent: f64,
+}
+
+impl CoveredMean {
+    fn over_region(step: &RegionValue) -> Self {
+        let (start, end) = (step.start, step.end);
+        Self {
+            period: Period { start, end },
+            mean: step.mean,
+            coverage_percent: step.coverage_percent,
+        }
+    }
+
+    fn along_line(answer: &StatisticsAnswer) -> Vec<Self> {
+        let means = answer.series(Statistic::Mean).into_iter();
+        let rows = means.zip(&answer.rows);
+        rows.map(|((period, mean), row)| Self {
+            period,
+            mean,
+            coverage_percent: row.coverage_percent,
+        })
+        .collect()
+    }
+}
+
+/// The series of a version of a product, without steps that hold data over less of a region's sea, or of a line, than `least`.
 ///
 /// # Errors
-/// No step in the asked period, a place or region outside the grid, and what reading meets.
+/// No step in the asked period, a place, region or line outside the grid, and what reading meets.
 pub(crate) async fn series(
     engine: &Engine,
     (manifest, id): Version<'_>,
@@ -103,6 +132,7 @@ pub(crate) async fn series(
         cited: Cited::of(manifest, id.clone()),
         place: SeriesPlace {
             region: None,
+            line: None,
             cell: None,
         },
         periods: vec![],
@@ -128,7 +158,15 @@ pub(crate) async fn series(
             let found = region_series_of(engine, asked, manifest).await?;
             read.place.region = Some(found.region);
             read.notes = found.notes;
-            read.take_means(&found.series, least);
+            let means: Vec<_> = found.series.iter().map(CoveredMean::over_region).collect();
+            read.take_means(&means, least, "region's sea");
+        }
+        SeriesQuery::Line(asked) => {
+            let found = statistics_of(engine, &asked.statistics(), manifest, id.clone()).await?;
+            let means = CoveredMean::along_line(&found);
+            read.place.line = Some(found.geometry);
+            read.notes = found.notes;
+            read.take_means(&means, least, "line");
         }
     }
     if manifest.quantity == Quantity::AccumulatedCarbon {

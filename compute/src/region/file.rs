@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use contract::region::{MAX_TEXT_BYTES, Region};
+use contract::geometry_text::MAX_TEXT_BYTES;
+use contract::region::Region;
 
 use super::rings::rings;
 use crate::ComputeError;

@@ -8,7 +8,6 @@ use contract::analysis::{
     AnalysisOptions, AnalysisPart, AnalysisWishes, Anomalies, Climatology, ClimatologyRow,
     SeriesAnalysis, SeriesQuery, SeriesWishes, Trend,
 };
-use contract::grid::LonLatDeg;
 use contract::manifest::Manifest;
 use contract::region::AskedRegion;
 use datafusion::arrow::array::{
@@ -19,13 +18,14 @@ use futures::future::BoxFuture;
 
 use super::columns::instant;
 use super::named::Named;
+use super::place::Place;
 use super::worked_out::{Asked, Kind, Question, batch, instants};
 use crate::analysis::analyse;
 use crate::{ComputeError, Engine};
 
 pub(super) static KIND: Kind = Kind {
     name: "analysis",
-    usage: "analysis takes texts: 'product', 'region' or 'LON,LAT', one of climatology, anomaly and trend, and perhaps bins of the year or, of a trend, a step, such as analysis('sst', 'global', 'climatology', 'season')",
+    usage: "analysis takes texts: 'product', 'region', 'LON,LAT' or 'LON,LAT;LON,LAT;...', one of climatology, anomaly and trend, and perhaps bins of the year or, of a trend, a step, such as analysis('sst', 'global', 'climatology', 'season')",
     more: 1..=2,
     asked,
 };
@@ -33,8 +33,8 @@ pub(super) static KIND: Kind = Kind {
 /// Name, signature, what it is, source.
 pub(super) const ABOUT: [&str; 4] = [
     "analysis",
-    "analysis('product', 'region'|'LON,LAT', 'climatology'|'anomaly'|'trend', 'bins'|'step') as a table",
-    "what is made of the series of a place or region, in the unit that people read; bins or step month if left out",
+    "analysis('product', 'region'|'LON,LAT'|'LON,LAT;LON,LAT;...', 'climatology'|'anomaly'|'trend', 'bins'|'step') as a table",
+    "what is made of the series of a place, region or line, in the unit that people read; bins or step month if left out",
     "",
 ];
 
@@ -80,13 +80,15 @@ fn asked(product: &Named, place: &str, more: &[&str]) -> Asked {
         (_, Some(bins)) => wishes.bins = Some(bins.parse()?),
     }
     let mut of = SeriesWishes::default();
-    match place.parse::<LonLatDeg>() {
-        Ok(place) => of.place = Some(place),
-        Err(_no_place) => of.region = Some(place.parse()?),
+    match place.parse()? {
+        Place::Point(place) => of.place = Some(place),
+        Place::Line(line) => of.line = Some(line),
+        Place::Region(region) => of.region = Some(region),
     }
     let of = of.query(product.product.clone());
+    let none = || ContractError::invalid("place", place, "give a region, a place or a line");
     Ok(Arc::new(Analysis {
-        of: of.ok_or_else(|| ContractError::invalid("place", place, "give a region or a place"))?,
+        of: of.ok_or_else(none)?,
         made,
         options: wishes.options()?,
     }))

@@ -3,10 +3,7 @@
 
 use std::sync::Arc;
 
-use contract::geometry::AskedGeometry;
-use contract::grid::LonLatDeg;
 use contract::manifest::Manifest;
-use contract::region::AskedRegion;
 use contract::statistics::{Statistic, Statistics, StatisticsAnswer, StatisticsQuery};
 use contract::time::TimeStep;
 use datafusion::arrow::array::{ArrayRef, Float64Array, RecordBatch, StringArray, UInt32Array};
@@ -15,6 +12,7 @@ use futures::future::BoxFuture;
 
 use super::columns::instant;
 use super::named::Named;
+use super::place::Place;
 use super::worked_out::{Asked, Kind, Question, batch, instants};
 use crate::reduce::statistics_of;
 use crate::{ComputeError, Engine};
@@ -35,14 +33,8 @@ pub(super) const ABOUT: [&str; 4] = [
 ];
 
 fn asked(product: &Named, place: &str, more: &[&str]) -> Asked {
-    let geometry = if place.contains(';') || place.trim_start().starts_with("LINESTRING") {
-        AskedGeometry::line(place)?
-    } else if let Ok(place) = place.parse::<LonLatDeg>() {
-        AskedGeometry::point(place, contract::geometry::Sampling::default())
-    } else {
-        place.parse::<AskedRegion>()?.into()
-    };
-    let usual = StatisticsQuery::new(product.product.clone(), geometry);
+    let place: Place = place.parse()?;
+    let usual = StatisticsQuery::new(product.product.clone(), place.into());
     let step = match more.first() {
         Some(step) => step.parse::<TimeStep>()?,
         None => usual.step,

@@ -1,9 +1,11 @@
 //! What is made of series of stored products: at a place and over regions, of one and of two, and of bands.
 
 use compute::analysis::{self, analyse};
+use compute::reduce::statistics_of;
 use compute::{Engine, ErrorClass};
 use contract::analysis::{
-    Along, AnalysisOptions, AnalysisPart, CorrelationQuery, HovmollerQuery, SeriesQuery,
+    Along, AnalysisOptions, AnalysisPart, CorrelationQuery, HovmollerQuery, LineSeriesQuery,
+    SeriesQuery,
 };
 use contract::earth::Earth;
 use contract::grid::{Grid, LonLatDeg};
@@ -96,6 +98,80 @@ async fn a_region_and_a_cell_of_one_value_have_one_analysis_and_it_is_that_of_th
         "2010-12-01T00:00:00Z"
     );
     assert_eq!(point.place.cell.unwrap().row, 5);
+}
+
+fn line(name: &str, line: &str) -> SeriesQuery {
+    let query = LineSeriesQuery::new(product(name), line.parse().unwrap());
+    SeriesQuery::Line(query)
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_line_is_analysed_as_its_mean_by_length_is_told() {
+    let (_folder, store) = folder_store();
+    // The western half has half the values, and nothing in every fifth month.
+    let of_cell = |month: u32, cell: usize| match (cell % 20 < 10, month % 5) {
+        (true, 4) => f32::NAN,
+        (true, _) => rising(month) / 2.0,
+        (false, _) => rising(month),
+    };
+    let manifest = wind(&store, "wind", &months(120, of_cell)).await;
+    let id = manifest.id();
+    let engine = Engine::in_process(store.clone(), parts(3));
+    let of = async |query: &SeriesQuery, percent: f64| {
+        let parts = vec![AnalysisPart::Anomaly, AnalysisPart::Trend];
+        let mut options = AnalysisOptions::new(parts).unwrap();
+        options.min_coverage = MinCoverage::new(percent).unwrap();
+        analyse(&engine, (&manifest, &id), query, &options).await
+    };
+    // A quarter of it lies in the west.
+    let own = line("wind", "-132,-15.5;-124,-15.5");
+    let found = of(&own, 0.0).await.unwrap();
+    let SeriesQuery::Line(query) = &own else {
+        panic!("no line");
+    };
+    let told = statistics_of(&engine, &query.statistics(), &manifest, id.clone());
+    let told = told.await.unwrap();
+    assert_eq!(found.place.line.as_deref(), Some("-132,-15.5;-124,-15.5"));
+    assert_eq!((found.place.region, found.place.cell), (None, None));
+    assert_eq!((found.step_count, found.value_count), (120, 120));
+    let rows = found.anomaly.unwrap().rows;
+    assert_eq!(rows.len(), told.rows.len());
+    for (month, (row, own)) in (0..).zip(rows.iter().zip(&told.rows)) {
+        assert_eq!((row.start, row.value), (own.start, own.values["mean"]));
+        let west = if month % 5 == 4 { 0.0 } else { 0.25 };
+        let mean = f64::from(rising(month)) * (0.75 + west / 2.0) / (0.75 + west);
+        assert!(
+            (row.value.unwrap() / mean - 1.0).abs() < 1e-4,
+            "{row:?} {mean}"
+        );
+        assert!((own.coverage_percent - 75.0 - 100.0 * west).abs() < 0.01);
+    }
+    // Steps that hold data along three quarters of it are left out, and said to be.
+    let full = of(&own, 80.0).await.unwrap();
+    assert_eq!((full.value_count, full.left_out_count), (96, 24));
+    assert_eq!(
+        full.notes,
+        ["24 of 120 steps hold data over less than 80 % of the line and are left out"]
+    );
+    // A line within one cell is that cell.
+    let within = of(&line("wind", "-130.2,-15.2;-130.4,-15.4"), 0.0).await;
+    let cell = of(&cell("wind", -130.3, -15.3), 0.0).await.unwrap();
+    let (within, cell) = (within.unwrap().trend.unwrap(), cell.trend.unwrap());
+    let slopes = [&within, &cell].map(|trend| trend.theil_sen.slope_per_decade);
+    assert!((slopes[0] - slopes[1]).abs() < 1e-6, "{slopes:?}");
+    // What lies beside the grid is refused, and what passes its edge is told of.
+    let refused = of(&line("wind", "0,0;10,10"), 0.0).await.unwrap_err();
+    assert_eq!(refused.class(), ErrorClass::BadRequest);
+    assert!(
+        refused.to_string().contains("outside the grid"),
+        "{refused}"
+    );
+    let beyond = of(&line("wind", "-125,-15;-110,-15"), 0.0).await.unwrap();
+    assert!(
+        beyond.notes[0].contains("lie on the grid"),
+        "{:?}",
+        beyond.notes
+    );
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -612,7 +612,7 @@ async fn functions_of_the_field_are_those_of_expressions_and_statistics_those_of
         let (found, own): (f64, f64) = (row[0].parse().unwrap(), own.values["mean"].unwrap());
         assert!((found - own).abs() < 1e-6, "{found} {own}");
     }
-    for place in ["162.3,0.5", "162,0;170,5"] {
+    for place in ["162.3,0.5", "162,0;170,5", "LINESTRING(162 0,170 5)"] {
         let asked = format!("SELECT count(mean) FROM stats('sst-test', '{place}')");
         assert_eq!(one(&sql, &asked).await, "12", "{place}");
     }
@@ -762,6 +762,10 @@ async fn climatologies_and_anomalies_are_tables() {
     }
     let seasons = "SELECT count(*) FROM analysis('sst', '162.3,0.5', 'climatology', 'season')";
     assert_eq!(one(&sql, seasons).await, "4");
+    // Along a line it is made of the means that `stats` tells.
+    let along = "SELECT count(*) FROM analysis('sst', '162,0;170,5', 'anomaly') a JOIN stats('sst', '162,0;170,5') s
+        USING (time_start) WHERE a.value = s.mean";
+    assert_eq!(one(&sql, along).await, "96");
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -4,10 +4,11 @@ use std::sync::Arc;
 
 use super::{
     Along, AnalysisOptions, AnalysisPart, BasePeriod, CalendarBins, CorrelationQuery,
-    HovmollerQuery, SeriesQuery,
+    HovmollerQuery, LineSeriesQuery, SeriesQuery,
 };
 use crate::ContractError;
 use crate::earth::Earth;
+use crate::geometry::AskedLine;
 use crate::grid::LonLatDeg;
 use crate::manifest::Manifest;
 use crate::product::ProductId;
@@ -23,35 +24,43 @@ pub struct SeriesWishes {
     pub place: Option<LonLatDeg>,
     /// As the mean over a region.
     pub region: Option<AskedRegion>,
+    /// As the mean along a line.
+    pub line: Option<AskedLine>,
     /// First instant.
     pub from: Option<TimeMs>,
     /// First instant after the asked period.
     pub to: Option<TimeMs>,
-    /// Figure of the earth, in regions.
+    /// Figure of the earth, in regions and along lines.
     pub earth: Option<Earth>,
     /// A version of a product that says how much of every cell is sea, in regions.
     pub ocean: Option<Arc<Manifest>>,
 }
 
 impl SeriesWishes {
-    /// The series of a product; none where both or neither of a place and a region are given.
+    /// The series of a product; none unless one of a place, a region and a line is given.
     pub fn query(self, product: ProductId) -> Option<SeriesQuery> {
         let (from, to) = (self.from, self.to);
-        match (self.place, self.region) {
-            (Some(place), None) => Some(SeriesQuery::Cell {
+        match (self.place, self.region, self.line) {
+            (Some(place), None, None) => Some(SeriesQuery::Cell {
                 product,
                 place,
                 from,
                 to,
             }),
-            (None, Some(region)) => Some(SeriesQuery::Region(RegionSeriesQuery {
+            (None, Some(region), None) => Some(SeriesQuery::Region(RegionSeriesQuery {
                 from,
                 to,
                 earth: self.earth.unwrap_or_default(),
                 ocean: self.ocean,
                 ..RegionSeriesQuery::new(product, region)
             })),
-            (Some(_), Some(_)) | (None, None) => None,
+            (None, None, Some(line)) => Some(SeriesQuery::Line(LineSeriesQuery {
+                from,
+                to,
+                earth: self.earth.unwrap_or_default(),
+                ..LineSeriesQuery::new(product, line)
+            })),
+            _ => None,
         }
     }
 }
@@ -67,7 +76,7 @@ pub struct AnalysisWishes {
     pub bins: Option<CalendarBins>,
     /// Means that a trend is drawn through.
     pub trend_step: Option<TimeStep>,
-    /// Least share of a region's sea that a step must hold data over.
+    /// Least share of a region's sea, or of a line, that a step must hold data over.
     pub min_coverage: Option<MinCoverage>,
 }
 
@@ -184,23 +193,46 @@ mod tests {
     }
 
     #[test]
-    fn a_series_is_of_a_place_or_of_a_region() {
-        let place = Some(LonLatDeg::new(1.0, 2.0).unwrap());
-        let region: Option<AskedRegion> = Some("global".parse().unwrap());
-        let of = |place, region| {
+    fn a_series_is_of_a_place_or_of_a_region_or_of_a_line() {
+        let of = |has_place: bool, has_region: bool, has_line: bool| {
             let wishes = SeriesWishes {
-                place,
-                region,
+                place: has_place.then(|| LonLatDeg::new(1.0, 2.0).unwrap()),
+                region: has_region.then(|| "global".parse().unwrap()),
+                line: has_line.then(|| "0,0;1,1".parse().unwrap()),
+                earth: Some(Earth::Sphere),
+                to: "2001".parse().ok(),
                 ..SeriesWishes::default()
             };
             wishes.query("sst".parse().unwrap())
         };
-        assert!(matches!(of(place, None), Some(SeriesQuery::Cell { .. })));
         assert!(matches!(
-            of(None, region.clone()),
+            of(true, false, false),
+            Some(SeriesQuery::Cell { .. })
+        ));
+        assert!(matches!(
+            of(false, true, false),
             Some(SeriesQuery::Region(_))
         ));
-        assert_eq!((of(place, region), of(None, None)), (None, None));
+        let Some(SeriesQuery::Line(line)) = of(false, false, true) else {
+            panic!("no line");
+        };
+        assert_eq!((line.earth, line.to), (Earth::Sphere, "2001".parse().ok()));
+        let along = SeriesQuery::Line(line);
+        let later = along
+            .of_product("ice".parse().unwrap())
+            .in_years("2003/2004".parse().ok());
+        assert_eq!(later.product().as_str(), "ice");
+        let [from, to] = ["2003", "2005"].map(|year| year.parse().ok());
+        assert_eq!(later.window(), (from, to));
+        for (place, region, line) in [
+            (true, true, false),
+            (true, false, true),
+            (false, true, true),
+            (true, true, true),
+            (false, false, false),
+        ] {
+            assert_eq!(of(place, region, line), None);
+        }
     }
 
     #[test]

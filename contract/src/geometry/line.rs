@@ -7,8 +7,8 @@ use serde::Serialize;
 use wkt::Wkt;
 
 use crate::ContractError;
+use crate::geometry_text::{self, document, within_limit};
 use crate::grid::LonLatDeg;
-use crate::region::MAX_TEXT_BYTES;
 
 /// Most vertices that the parts of a line may have together.
 pub const MAX_VERTICES: usize = 1_000_000;
@@ -93,13 +93,7 @@ impl FromStr for Line {
     /// (LINESTRING, MULTILINESTRING).
     fn from_str(s: &str) -> Result<Self, Self::Err> {
         let told = |reason: String| ContractError::invalid("line", s, reason);
-        if s.len() > MAX_TEXT_BYTES {
-            let bytes = s.len();
-            return Err(told(format!(
-                "{bytes} bytes, at most {MAX_TEXT_BYTES} are taken; simplify it"
-            )));
-        }
-        let text = s.trim();
+        let text = within_limit(s).map_err(told)?.trim();
         let parts = if text.starts_with('{') {
             from_geojson(text)
         } else if text.starts_with(|c: char| c.is_ascii_alphabetic()) {
@@ -112,6 +106,27 @@ impl FromStr for Line {
                 let text = if text.is_empty() { s } else { &text };
                 ContractError::invalid(what, text, reason)
             }
+        })
+    }
+}
+
+/// A line and its name in answers.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AskedLine {
+    /// Its shape.
+    pub line: Line,
+    /// The text or file that it was asked for with; of a long text its digest.
+    pub name: String,
+}
+
+impl FromStr for AskedLine {
+    type Err = ContractError;
+
+    /// Parses what [`Line`] does.
+    fn from_str(s: &str) -> Result<Self, Self::Err> {
+        Ok(Self {
+            line: s.parse()?,
+            name: geometry_text::name(s),
         })
     }
 }
@@ -131,12 +146,8 @@ fn from_pairs(text: &str) -> Result<Parts, String> {
 }
 
 fn from_geojson(text: &str) -> Result<Parts, String> {
-    let short = |e: geojson::Error| e.to_string().chars().take(200).collect::<String>();
-    let document: GeoJson = text
-        .parse()
-        .map_err(|e| format!("it is no GeoJSON: {}", short(e)))?;
     let mut parts = vec![];
-    match &document {
+    match &document(text)? {
         GeoJson::Geometry(geometry) => collect(&geometry.value, &mut parts)?,
         GeoJson::Feature(feature) => {
             let mut own = feature.geometry.iter();

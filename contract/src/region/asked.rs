@@ -2,6 +2,7 @@
 
 use super::{NamedRegion, Region};
 use crate::ContractError;
+use crate::geometry_text;
 use crate::grid::rounded_deg;
 
 /// A region and its name in answers.
@@ -9,7 +10,7 @@ use crate::grid::rounded_deg;
 pub struct AskedRegion {
     /// Its shape.
     pub region: Region,
-    /// Its name, `west,south,east,north`, or the text or file that it was asked for with.
+    /// Its name, `west,south,east,north`, or the text or file that it was asked for with; of a long text its digest.
     pub name: String,
 }
 
@@ -28,7 +29,7 @@ impl std::str::FromStr for AskedRegion {
             } if NamedRegion::find(s).is_none() => [west, south, east, north]
                 .map(|edge| rounded_deg(edge).to_string())
                 .join(","),
-            _ => s.to_owned(),
+            _ => geometry_text::name(s),
         };
         Ok(Self { region, name })
     }

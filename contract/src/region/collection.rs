@@ -5,9 +5,10 @@ use std::collections::BTreeSet;
 use geojson::feature::Id;
 use geojson::{Feature, GeoJson};
 
-use super::text::{checked, collect, first_line, within_limit};
+use super::text::{checked, collect};
 use super::{AskedRegion, Region};
 use crate::ContractError;
+use crate::geometry_text::document;
 
 /// Most regions that are asked for at once.
 pub const MAX_REGIONS: usize = 100;
@@ -25,10 +26,7 @@ pub fn named_regions(text: &str) -> Result<Vec<AskedRegion>, ContractError> {
 }
 
 fn read(text: &str) -> Result<Vec<AskedRegion>, String> {
-    let document: GeoJson = within_limit(text)?
-        .parse()
-        .map_err(|e| format!("it is no GeoJSON: {}", first_line(&e)))?;
-    let GeoJson::FeatureCollection(collection) = document else {
+    let GeoJson::FeatureCollection(collection) = document(text)? else {
         return Err("a FeatureCollection is wanted, a region a feature".to_owned());
     };
     let count = collection.features.len();

@@ -8,9 +8,8 @@ use wkt::types::{Coord, LineString};
 
 use super::{MAX_CORNERS, Polygon};
 use crate::ContractError;
+use crate::geometry_text::{document, within_limit};
 
-/// Longest text of a region, bytes: a million corners written with 17 digits each.
-pub const MAX_TEXT_BYTES: usize = 64 << 20;
 /// Deepest nesting of geometry collections.
 const MAX_DEPTH: usize = 8;
 /// First words of well-known text; those without area are refused by name.
@@ -35,7 +34,7 @@ pub(super) fn polygons(text: &str) -> Option<Result<Vec<Polygon>, ContractError>
         .map(|c| c.to_ascii_uppercase())
         .collect();
     let parsed = if text.starts_with('{') {
-        within_limit(text).and_then(geojson_polygons)
+        geojson_polygons(text)
     } else if WKT_WORDS.contains(&word.trim_end_matches(['Z', 'M'])) {
         within_limit(text).and_then(|text| wkt_polygons(&word, text))
     } else {
@@ -43,16 +42,6 @@ pub(super) fn polygons(text: &str) -> Option<Result<Vec<Polygon>, ContractError>
     };
     let checked = parsed.and_then(checked);
     Some(checked.map_err(|reason| ContractError::invalid("region", text, reason)))
-}
-
-pub(super) fn within_limit(text: &str) -> Result<&str, String> {
-    if text.len() > MAX_TEXT_BYTES {
-        let bytes = text.len();
-        return Err(format!(
-            "{bytes} bytes, at most {MAX_TEXT_BYTES} are taken; simplify it"
-        ));
-    }
-    Ok(text)
 }
 
 pub(super) fn checked(polygons: Vec<Polygon>) -> Result<Vec<Polygon>, String> {
@@ -68,11 +57,8 @@ pub(super) fn checked(polygons: Vec<Polygon>) -> Result<Vec<Polygon>, String> {
 
 /// A geometry, a feature or a collection of features: their polygons together.
 fn geojson_polygons(text: &str) -> Result<Vec<Polygon>, String> {
-    let document: GeoJson = text
-        .parse()
-        .map_err(|e| format!("it is no GeoJSON: {}", first_line(&e)))?;
     let mut polygons = vec![];
-    match &document {
+    match &document(text)? {
         GeoJson::Geometry(geometry) => collect(geometry, 0, &mut polygons)?,
         GeoJson::Feature(feature) => {
             let mut geometry = feature.geometry.iter();
@@ -87,12 +73,6 @@ fn geojson_polygons(text: &str) -> Result<Vec<Polygon>, String> {
         }
     }
     Ok(polygons)
-}
-
-pub(super) fn first_line(error: &dyn std::fmt::Display) -> String {
-    let text = error.to_string();
-    let line = text.lines().next().unwrap_or_default();
-    line.chars().take(200).collect()
 }
 
 pub(super) fn collect(

@@ -91,7 +91,7 @@ impl Analysis {
     }
 }
 
-/// Where a series is taken: a region or a cell.
+/// Where a series is taken: a region, a cell or a line.
 #[derive(Debug, Args)]
 #[group(required = true, multiple = false)]
 pub(crate) struct Place {
@@ -101,6 +101,9 @@ pub(crate) struct Place {
     /// The cell that holds a place, degrees east and north, in place of a region.
     #[arg(long, value_name = "LON,LAT", allow_hyphen_values = true)]
     pub(crate) at: Option<LonLatDeg>,
+    /// The mean along a line, each cell by the length in it: `LON,LAT;LON,LAT;...`, a GeoJSON or WKT file, or the text of one.
+    #[arg(long, value_name = "LINE", allow_hyphen_values = true)]
+    pub(crate) line: Option<String>,
 }
 
 /// `fluxglobe stats correlate`.
@@ -126,7 +129,7 @@ pub(crate) struct StatsCorrelate {
     /// First instant after the period. The products' own if absent.
     #[arg(long)]
     pub(crate) to: Option<TimeMs>,
-    /// Figure of the earth for areas: wgs84, sphere (R = 6371 km) or local-radius (as FluxEngine sums).
+    /// Figure of the earth for areas and lengths: wgs84, sphere (R = 6371 km) or local-radius (as FluxEngine sums).
     #[arg(long, default_value = "wgs84")]
     pub(crate) earth: Earth,
     /// JSON instead of a table.
@@ -157,7 +160,7 @@ pub(crate) struct StatsDifference {
     pub(crate) minus_manifest: Option<ManifestId>,
     #[command(flatten)]
     pub(crate) place: Place,
-    /// Figure of the earth for areas: wgs84, sphere (R = 6371 km) or local-radius (as FluxEngine sums).
+    /// Figure of the earth for areas and lengths: wgs84, sphere (R = 6371 km) or local-radius (as FluxEngine sums).
     #[arg(long, default_value = "wgs84")]
     pub(crate) earth: Earth,
     /// JSON instead of a table.

@@ -8,7 +8,7 @@ use contract::region::Cells;
 use contract::statistics::{MinCoverage, Statistics, StatisticsWishes};
 use contract::time::{TimeMs, TimeStep};
 
-use super::analysis::{Analysis, PlotFile, StatsCorrelate, StatsDifference, StatsHovmoller};
+use super::analysis::{Analysis, StatsCorrelate, StatsDifference, StatsHovmoller};
 use super::steps::STEPS;
 
 /// `fluxglobe stats`.
@@ -16,7 +16,7 @@ use super::steps::STEPS;
 pub(crate) enum Stats {
     /// The series of the cell at a place, or statistics of it by day, month, year ...
     Point(StatsPoint),
-    /// Statistics along a line, each cell by the length of the line in it.
+    /// The mean along a line at every step, each cell by the length of the line in it; or other statistics of it.
     Line(StatsLine),
     /// The mean over a region at every step, each cell by its area, with the area that holds data; or other statistics of it.
     Polygon(StatsPolygon),
@@ -110,9 +110,8 @@ pub(crate) struct StatsLine {
     pub(crate) earth: Earth,
     #[command(flatten)]
     pub(crate) statistics: StatisticsOptions,
-    /// Draw it too: the mean with its standard deviation where both are asked for, and the other statistics of its unit.
-    #[arg(long, value_name = "FILE.svg|FILE.png")]
-    pub(crate) plot: Option<PlotFile>,
+    #[command(flatten)]
+    pub(crate) analysis: Analysis,
     /// JSON instead of a table.
     #[arg(long)]
     pub(crate) json: bool,

@@ -1,4 +1,4 @@
-//! What is made of series on the command line: `fluxglobe stats point|polygon --climatology --anomaly --trend --season
+//! What is made of series on the command line: `fluxglobe stats point|line|polygon --climatology --anomaly --trend --season
 //! --extremes`, `stats correlate`, `stats difference`, `stats hovmoller`; tables or JSON out, and plots.
 
 mod tables;
@@ -101,11 +101,11 @@ pub(crate) async fn hovmoller(settings: &Settings, options: &StatsHovmoller) -> 
     Ok(())
 }
 
-/// Who reads a series: one cell from its block in this process, a region where regions are summed.
+/// Who reads a series: one cell from its block in this process, a region or a line where regions are summed.
 fn reader(settings: &Settings, store: Store, query: &SeriesQuery) -> Result<Engine> {
     match query {
         SeriesQuery::Cell { .. } => Ok(Engine::local(store)),
-        SeriesQuery::Region(_) => deployment::region_engine(settings, store),
+        SeriesQuery::Region(_) | SeriesQuery::Line(_) => deployment::region_engine(settings, store),
     }
 }
 

@@ -10,6 +10,7 @@ mod fill_error;
 mod flight_sql;
 mod gc;
 pub(crate) mod generate;
+mod geometry;
 mod ingest;
 mod legend;
 mod migrate;

@@ -1,18 +1,14 @@
 //! `fluxglobe stats` with statistics: a geometry, bins of time and names of statistics in; a table, CSV or JSON out.
 
-use std::path::Path;
-
 use anyhow::Result;
 use comfy_table::presets::NOTHING;
 use comfy_table::{CellAlignment, Table};
 use compute::reduce::statistics;
-use compute::region::file;
-use contract::geometry::AskedGeometry;
 use contract::rows::Tabular as _;
-use contract::statistics::{StatisticsAnswer, StatisticsQuery, StatisticsRow, StatisticsWishes};
+use contract::statistics::{StatisticsAnswer, StatisticsQuery, StatisticsRow};
 use export::answer::AnswerFormat;
 
-use crate::cli::{PlotFile, Settings, StatisticsOptions, StatsLine};
+use crate::cli::{PlotFile, Settings, StatisticsOptions};
 use crate::{deployment, plot, progress};
 
 /// How an answer is printed.
@@ -31,31 +27,6 @@ impl Form {
             (false, false) => Self::Table,
         }
     }
-}
-
-pub(crate) async fn line(settings: &Settings, options: &StatsLine) -> Result<()> {
-    let asked = if file::is_file_name(&options.line) {
-        let text = file::text(Path::new(&options.line))?;
-        AskedGeometry {
-            name: options.line.clone(),
-            ..AskedGeometry::line(&text)?
-        }
-    } else {
-        AskedGeometry::line(&options.line)?
-    };
-    let wishes = StatisticsWishes {
-        from: options.from,
-        to: options.to,
-        earth: Some(options.earth),
-        ..options.statistics.wishes()
-    };
-    run(
-        settings,
-        &wishes.query(options.product.clone(), asked),
-        Form::of(&options.statistics, options.json),
-        options.plot.as_ref(),
-    )
-    .await
 }
 
 /// Asks, draws and prints.

@@ -1,4 +1,4 @@
-//! `fluxglobe stats`: a product and a place or a region in; the series of its cell, or of the region's mean, as a table or
+//! `fluxglobe stats`: a product and a place, a line or a region in; the series of its cell, or of the mean over it, as a table or
 //! JSON out.
 
 use anyhow::{Result, bail};
@@ -11,11 +11,12 @@ use contract::grid::LonLatDeg;
 use contract::series::{PointSeries, RegionSeries};
 use contract::statistics::{PointQuestion, RegionQuestion, StatisticsWishes};
 
-use crate::cli::{Settings, Stats, StatsPoint, StatsPolygon};
+use crate::cli::{Settings, Stats, StatsLine, StatsPoint, StatsPolygon};
 use crate::{deployment, plot, progress};
 
 use super::analysis::{self, Output};
 use super::budget::{ocean, stored_region};
+use super::geometry;
 use super::statistics::{self, Form};
 
 /// Width of the longest bar, characters.
@@ -26,7 +27,7 @@ const M2_PER_MILLION_KM2: f64 = 1e12;
 pub(crate) async fn run(settings: &Settings, which: Stats) -> Result<()> {
     match which {
         Stats::Point(options) => point(settings, &options).await,
-        Stats::Line(options) => statistics::line(settings, &options).await,
+        Stats::Line(options) => Box::pin(line(settings, &options)).await,
         Stats::Polygon(options) => Box::pin(polygon(settings, &options)).await,
         Stats::Correlate(options) => analysis::correlate(settings, &options).await,
         Stats::Difference(options) => analysis::difference(settings, &options).await,
@@ -93,6 +94,37 @@ async fn point(settings: &Settings, options: &StatsPoint) -> Result<()> {
     ));
     progress::say(&answer.cited.source);
     Ok(())
+}
+
+async fn line(settings: &Settings, options: &StatsLine) -> Result<()> {
+    let line = geometry::line(&options.line)?;
+    let output = Output {
+        json: options.json,
+        plot: options.analysis.plot.as_ref(),
+    };
+    let asked = &options.statistics;
+    if let Some(analysed) = options.analysis.asked(asked.min_coverage)? {
+        alone(asked.statistic.is_none() && asked.step.is_none() && !asked.csv)?;
+        let wishes = SeriesWishes {
+            line: Some(line),
+            from: options.from,
+            to: options.to,
+            earth: Some(options.earth),
+            ..SeriesWishes::default()
+        };
+        let store = deployment::store(settings)?;
+        let query = analysis::series(wishes, &options.product)?;
+        return analysis::of_series(settings, store, &query, &analysed, output).await;
+    }
+    let wishes = StatisticsWishes {
+        from: options.from,
+        to: options.to,
+        earth: Some(options.earth),
+        ..asked.wishes()
+    };
+    let query = wishes.query(options.product.clone(), line.into());
+    let form = Form::of(asked, options.json);
+    statistics::run(settings, &query, form, output.plot).await
 }
 
 async fn polygon(settings: &Settings, options: &StatsPolygon) -> Result<()> {

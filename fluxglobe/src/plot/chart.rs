@@ -43,10 +43,14 @@ pub(super) fn named(region: &str) -> String {
 
 /// Where a series is taken, for people.
 pub(super) fn place(answer: &SeriesAnalysis) -> String {
-    match (&answer.place.region, &answer.place.cell) {
-        (Some(region), _) => format!("mean over {}", named(region)),
-        (None, Some(cell)) => format!("cell around {:.4}, {:.4}", cell.lon_deg, cell.lat_deg),
-        (None, None) => String::new(),
+    let place = &answer.place;
+    match (&place.region, &place.line, &place.cell) {
+        (Some(region), _, _) => format!("mean over {}", named(region)),
+        (None, Some(line), _) => format!("mean along {}", named(line)),
+        (None, None, Some(cell)) => {
+            format!("cell around {:.4}, {:.4}", cell.lon_deg, cell.lat_deg)
+        }
+        (None, None, None) => String::new(),
     }
 }
 

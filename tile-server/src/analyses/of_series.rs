@@ -62,18 +62,27 @@ fn asked(question: &SeriesQuestion) -> Value {
     }
 }
 
+/// A tree of a geometry would take many times its size: it is told by its digest.
 fn where_and_when(series: &SeriesQuery) -> Value {
     let (from, to) = series.window();
     match series {
         SeriesQuery::Cell { place, .. } => json!(["cell", place, from, to]),
         SeriesQuery::Region(query) => json!([
             "region",
-            query.region,
+            Digest::of_json(&query.region),
             query.region_name,
             from,
             to,
             query.earth,
             query.ocean.as_ref().map(|ocean| ocean.id()),
+        ]),
+        SeriesQuery::Line(query) => json!([
+            "line",
+            Digest::of_json(&query.line.line),
+            query.line.name,
+            from,
+            to,
+            query.earth,
         ]),
     }
 }

@@ -1,4 +1,4 @@
-//! `/api/products/{product}/analysis`: climatology, anomaly, trend, season and extremes of a cell's or a region's series.
+//! `/api/products/{product}/analysis`: climatology, anomaly, trend, season and extremes of the series of a cell, a region or a line.
 
 use axum::Json;
 use axum::extract::State;
@@ -31,8 +31,8 @@ pub(crate) struct AnalysisParameters {
     /// Means that the trend is drawn through; `month` unless told otherwise.
     #[param(value_type = Option<TimeStep>)]
     trend_step: Option<String>,
-    /// Least coverage, percent: steps that hold data over less of the region's sea are left out, and the answer says how many; 0
-    /// unless told otherwise.
+    /// Least coverage, percent: steps that hold data over less of the region's sea, or of the line, are left out, and the answer says
+    /// how many; 0 unless told otherwise.
     #[param(value_type = Option<f64>, minimum = 0, maximum = 100)]
     min_coverage: Option<String>,
     /// Longitude of a cell, degrees east, -180 to 360; with `lat`, in place of a region.
@@ -43,11 +43,14 @@ pub(crate) struct AnalysisParameters {
     lat: Option<String>,
     /// `global`, a name that `/api/regions` lists, `west,south,east,north` in degrees, GeoJSON or well-known text.
     region: Option<String>,
+    /// `LON,LAT;LON,LAT;...` in degrees, GeoJSON or well-known text, in place of a region: the mean along a line, each cell by the length
+    /// in it.
+    line: Option<String>,
     /// First instant, ISO 8601 UTC; the product's own unless one is given.
     from: Option<String>,
     /// First instant after the period; the product's own unless one is given.
     to: Option<String>,
-    /// Figure of the earth for areas; `wgs84` unless one is given.
+    /// Figure of the earth for areas and lengths; `wgs84` unless one is given.
     #[param(value_type = Option<contract::earth::Earth>)]
     earth: Option<String>,
     /// Landed product whose cells say how much of them is sea or land, in place of Natural Earth.
@@ -89,6 +92,7 @@ pub(crate) async fn get(
     let text = SeriesText {
         place: [asked.lon.as_deref(), asked.lat.as_deref()],
         region: asked.region.as_deref(),
+        line: asked.line.as_deref(),
         period: [asked.from.as_deref(), asked.to.as_deref()],
         earth: asked.earth.as_deref(),
         ocean: asked.ocean.as_deref(),
@@ -106,11 +110,12 @@ pub(crate) async fn get(
     .await
 }
 
-/// A cell or a region, and a period, as an address has them.
+/// A cell, a region or a line, and a period, as an address has them.
 pub(crate) struct SeriesText<'a> {
     /// Longitude and latitude.
     pub(crate) place: [Option<&'a str>; 2],
     pub(crate) region: Option<&'a str>,
+    pub(crate) line: Option<&'a str>,
     /// First instant, and the first one after it.
     pub(crate) period: [Option<&'a str>; 2],
     pub(crate) earth: Option<&'a str>,
@@ -126,7 +131,7 @@ impl SeriesText<'_> {
     ) -> Result<SeriesQuery, ServerError> {
         let missing = ServerError::Missing {
             name: "region",
-            wanted: "a region, or lon and lat of a cell, and not both",
+            wanted: "a region, a line, or lon and lat of a cell, and one of them alone",
         };
         let place = match self.place {
             [None, None] => None,
@@ -140,6 +145,7 @@ impl SeriesText<'_> {
         let wishes = SeriesWishes {
             place,
             region: parsed(self.region)?,
+            line: parsed(self.line)?,
             from: time(self.period[0])?,
             to: time(self.period[1])?,
             earth: parsed(self.earth)?,

@@ -37,11 +37,14 @@ pub(crate) struct CorrelationParameters {
     lat: Option<String>,
     /// `global`, a name that `/api/regions` lists, `west,south,east,north` in degrees, GeoJSON or well-known text.
     region: Option<String>,
+    /// `LON,LAT;LON,LAT;...` in degrees, GeoJSON or well-known text, in place of a region: the mean along a line, each cell by the length
+    /// in it.
+    line: Option<String>,
     /// First instant, ISO 8601 UTC; the products' own unless one is given.
     from: Option<String>,
     /// First instant after the period; the products' own unless one is given.
     to: Option<String>,
-    /// Figure of the earth for areas; `wgs84` unless one is given.
+    /// Figure of the earth for areas and lengths; `wgs84` unless one is given.
     #[param(value_type = Option<contract::earth::Earth>)]
     earth: Option<String>,
     /// Version, as answers name it; the newest unless one is given.
@@ -50,7 +53,7 @@ pub(crate) struct CorrelationParameters {
     with_manifest: Option<String>,
 }
 
-/// The correlation of two products over a region or at a place, at every lag.
+/// The correlation of two products over a region, along a line or at a place, at every lag.
 #[utoipa::path(
     get,
     path = "/api/products/{product}/correlation",
@@ -79,6 +82,7 @@ pub(crate) async fn get(
     let series = SeriesText {
         place: [asked.lon.as_deref(), asked.lat.as_deref()],
         region: asked.region.as_deref(),
+        line: asked.line.as_deref(),
         period: [asked.from.as_deref(), asked.to.as_deref()],
         earth: asked.earth.as_deref(),
         ocean: None,

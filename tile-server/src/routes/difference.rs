@@ -34,7 +34,10 @@ pub(crate) struct DifferenceParameters {
     lat: Option<String>,
     /// `global`, a name that `/api/regions` lists, `west,south,east,north` in degrees, GeoJSON or well-known text.
     region: Option<String>,
-    /// Figure of the earth for areas; `wgs84` unless one is given.
+    /// `LON,LAT;LON,LAT;...` in degrees, GeoJSON or well-known text, in place of a region: the mean along a line, each cell by the length
+    /// in it.
+    line: Option<String>,
+    /// Figure of the earth for areas and lengths; `wgs84` unless one is given.
     #[param(value_type = Option<contract::earth::Earth>)]
     earth: Option<String>,
 }
@@ -65,6 +68,7 @@ pub(crate) async fn get(
     let series = SeriesText {
         place: [asked.lon.as_deref(), asked.lat.as_deref()],
         region: asked.region.as_deref(),
+        line: asked.line.as_deref(),
         period: [None, None],
         earth: asked.earth.as_deref(),
         ocean: None,

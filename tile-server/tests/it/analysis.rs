@@ -46,14 +46,25 @@ async fn every_parameter_of_an_analysis_reaches_the_analyst_once() {
         "parts=season&region=14n-50n",
         "parts=trend&region=global",
         "parts=trend&region=global&min_coverage=40",
+        "parts=trend&line=0,0;10,10",
     ] {
         app.get(&format!("/api/products/sst/analysis?{other}"))
             .await;
     }
     assert_eq!(
         app.analyst.made.lock().unwrap().len(),
-        5,
+        6,
         "two questions are taken for one"
+    );
+    let SeriesQuestion::Analysis { series, .. } = last(&app) else {
+        panic!("another question");
+    };
+    let SeriesQuery::Line(along) = series else {
+        panic!("no line: {series:?}");
+    };
+    assert_eq!(
+        (along.line.name.as_str(), along.line.line.edges().count()),
+        ("0,0;10,10", 1)
     );
 }
 
@@ -99,12 +110,22 @@ async fn what_cannot_be_asked_is_refused_with_what_can() {
     for (path, reason) in [
         ("analysis?region=global", "give one of climatology"),
         ("analysis?region=global&parts=median", "median"),
-        ("analysis?parts=trend", "a region, or lon and lat"),
+        ("analysis?parts=trend", "a region, a line, or lon and lat"),
         (
             "analysis?parts=trend&region=global&lon=1&lat=1",
-            "and not both",
+            "one of them alone",
         ),
-        ("analysis?parts=trend&lon=1", "a region, or lon and lat"),
+        (
+            "analysis?parts=trend&region=global&line=0,0;1,1",
+            "one of them alone",
+        ),
+        ("difference?line=0,0;1,1&lon=1&lat=1", "one of them alone"),
+        ("analysis?parts=trend&line=5,5", "two different places"),
+        ("correlation?with=flux&line=0,0;180,0", "opposite"),
+        (
+            "analysis?parts=trend&lon=1",
+            "a region, a line, or lon and lat",
+        ),
         (
             "analysis?parts=climatology&region=global&base=2020/1991",
             "FIRST/LAST",

@@ -8,7 +8,7 @@ use crate::app::TestApp;
 /// An address, and what is to be changed in it: a part and what stands in its place.
 type Question = (&'static str, &'static [(&'static str, &'static str)]);
 
-const QUESTIONS: [Question; 8] = [
+const QUESTIONS: [Question; 9] = [
     (
         "sst/point?lon=10&lat=20&format=json",
         &[
@@ -72,10 +72,24 @@ const QUESTIONS: [Question; 8] = [
         ],
     ),
     (
+        "sst/analysis?line=0,0;10,10&parts=anomaly&min_coverage=0&from=2000-01&to=2000-03&earth=wgs84",
+        &[
+            ("10,10", "10,20"),
+            // Of one line, which is called another.
+            ("10,10", "10,10.0"),
+            ("min_coverage=0", "min_coverage=1"),
+            ("from=2000-01", "from=2000-02"),
+            ("to=2000-03", "to=2000-02"),
+            ("wgs84", "sphere"),
+            ("line=0,0;10,10", "region=0,0,10,10"),
+        ],
+    ),
+    (
         "sst/correlation?with=flux&region=global&max_lag=7&step=month&deseasonalise=false&from=2000-01&to=2000-03&earth=wgs84",
         &[
             ("with=flux", "with=mask"),
             ("global", "14n-50n"),
+            ("region=global", "line=0,0;1,1"),
             ("max_lag=7", "max_lag=8"),
             ("step=month", "step=year"),
             ("false", "true"),
@@ -88,6 +102,7 @@ const QUESTIONS: [Question; 8] = [
         "sst/difference?region=global&period=2000/2000&minus=sst&minus_period=2000/2001&earth=wgs84",
         &[
             ("global", "14n-50n"),
+            ("region=global", "line=0,0;1,1"),
             ("&period=2000/2000", "&period=1999/2000"),
             ("minus=sst", "minus=other"),
             ("minus_period=2000/2001", "minus_period=2000/2002"),

@@ -16,13 +16,14 @@ const M2_PER_MILLION_KM2: f64 = 1e12;
 
 /// Where a series is taken, for people.
 pub(super) fn place(place: &SeriesPlace) -> String {
-    match (&place.region, &place.cell) {
-        (Some(region), _) => format!("mean over {region}"),
-        (None, Some(cell)) => format!(
+    match (&place.region, &place.line, &place.cell) {
+        (Some(region), _, _) => format!("mean over {region}"),
+        (None, Some(line), _) => format!("mean along {line}, each cell by the length in it"),
+        (None, None, Some(cell)) => format!(
             "mean of the cell around {:.4}, {:.4}",
             cell.lon_deg, cell.lat_deg
         ),
-        (None, None) => String::new(),
+        (None, None, None) => String::new(),
     }
 }
 

@@ -9,6 +9,7 @@ use storage::Store;
 use super::{reader, say_source, tables, version};
 use crate::cli::{Place, Settings, StatsCorrelate, StatsDifference};
 use crate::command::budget::stored_region;
+use crate::command::geometry;
 use crate::{deployment, progress};
 
 pub(crate) async fn correlate(settings: &Settings, options: &StatsCorrelate) -> Result<()> {
@@ -100,7 +101,7 @@ pub(crate) async fn difference(settings: &Settings, options: &StatsDifference) -
     Ok(())
 }
 
-/// The cell or the region that is asked for.
+/// The cell, the region or the line that is asked for.
 async fn at(settings: &Settings, store: &Store, place: &Place) -> Result<SeriesWishes> {
     let region = match &place.region {
         Some(text) => Some(stored_region(settings, store, text).await?),
@@ -109,6 +110,7 @@ async fn at(settings: &Settings, store: &Store, place: &Place) -> Result<SeriesW
     Ok(SeriesWishes {
         place: place.at,
         region,
+        line: place.line.as_deref().map(geometry::line).transpose()?,
         ..SeriesWishes::default()
     })
 }
@@ -116,5 +118,5 @@ async fn at(settings: &Settings, store: &Store, place: &Place) -> Result<SeriesW
 /// The series of a product that is asked for.
 pub(crate) fn series(wishes: SeriesWishes, product: &ProductId) -> Result<SeriesQuery> {
     let query = wishes.query(product.clone());
-    query.context("give a region or a place: --region or --at")
+    query.context("give a region, a place or a line: --region, --at or --line")
 }
