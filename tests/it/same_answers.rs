@@ -296,6 +296,96 @@ fn analysed_as_told(data: &Path) {
     assert!(refused.contains("leave --statistic"), "{refused}");
 }
 
+/// A polygon of so many corners round 20° E, 10° N.
+fn round_polygon(corners: u32) -> String {
+    let corner = |at: u32| {
+        let turn = f64::from(at % corners) / f64::from(corners) * std::f64::consts::TAU;
+        format!(
+            "[{:.12},{:.12}]",
+            20.0 + 15.0 * turn.cos(),
+            10.0 + 15.0 * turn.sin()
+        )
+    };
+    let corners: Vec<String> = (0..=corners).map(corner).collect();
+    format!(
+        r#"{{"type":"Polygon","coordinates":[[{}]]}}"#,
+        corners.join(",")
+    )
+}
+
+#[test]
+fn a_geometry_that_is_sent_along_has_the_answer_of_a_file_and_of_an_address() {
+    let folder = landed();
+    let data = folder.path();
+    let server = Server::start(data, &["serve"]).unwrap();
+    let track = r#"{"type":"LineString","coordinates":[[-40,10],[-10,40]]}"#;
+    let small = round_polygon(20);
+    for (path, name, geometry) in [
+        ("area?to=2000-03", "region", small.as_str()),
+        ("area?statistic=mean,p90&step=total", "region", &small),
+        ("line?statistic=mean,max", "line", track),
+        ("analysis?parts=climatology,extremes", "region", &small),
+        ("analysis?parts=climatology,extremes", "line", track),
+        ("correlation?with=flux-accumulated", "line", track),
+        (
+            "difference?period=2000/2000&minus_period=1999/2001",
+            "region",
+            &small,
+        ),
+        ("budget?step=month", "region", &small),
+    ] {
+        let path = format!("/api/products/flux/{path}");
+        let got = server.get(&format!("{path}&{name}={}", escaped(geometry)));
+        let (got, sent) = (got.unwrap(), server.post_geojson(&path, geometry).unwrap());
+        assert_eq!(sent.status, 200, "{path}: {}", sent.text());
+        assert!(sent.body == got.body && sent.etag == got.etag, "{path}");
+    }
+    // One that no address has room for: the command line reads it from a file, which it is called by.
+    let large = round_polygon(100_000);
+    let file = data.join("large.geojson");
+    std::fs::write(&file, &large).unwrap();
+    let file = file.to_str().unwrap();
+    let words = [
+        "stats",
+        "polygon",
+        "--product",
+        "flux",
+        "--json",
+        "--region",
+        file,
+    ];
+    let mut printed = program::json(data, &words).unwrap();
+    let path = "/api/products/flux/area?to=2000-04";
+    let mut served = server.post_geojson(path, &large).unwrap().json().unwrap();
+    let name = served["region"].as_str().unwrap().to_owned();
+    assert!(name.starts_with("text of ") && name.len() < 120, "{name}");
+    for answer in [&mut printed, &mut served] {
+        answer["region"] = Value::Null;
+    }
+    assert_eq!(served, printed);
+    // What crosses itself counts once and is told of, and what is no place is refused with the reason of the command line.
+    let crossing = r#"{"type":"Polygon","coordinates":[[[0,0],[20,20],[20,0],[0,20],[0,0]]]}"#;
+    let served = server.post_geojson(path, crossing).unwrap().json().unwrap();
+    assert!(
+        served["notes"].to_string().contains("rings cross"),
+        "{served}"
+    );
+    let nowhere = crossing.replace("[20,20]", "[20,91]");
+    let words = [
+        "stats",
+        "polygon",
+        "--product",
+        "flux",
+        "--region",
+        &nowhere,
+    ];
+    let refused = program::fail(data, &words).unwrap();
+    let served = server.post_geojson(path, &nowhere).unwrap();
+    assert_eq!(served.status, 400, "{}", served.text());
+    let reason = served.json().unwrap()["error"].as_str().unwrap().to_owned();
+    assert!(refused.contains(&reason), "{refused}: {reason}");
+}
+
 #[test]
 fn what_there_is_has_one_name_for_each_of_its_parts() {
     let folder = landed();

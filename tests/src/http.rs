@@ -30,12 +30,26 @@ impl Answer {
 
 /// Fetches an address; every status is an answer.
 pub fn get(url: &str) -> Result<Answer> {
-    let agent: ureq::Agent = ureq::Agent::config_builder()
+    read(agent().get(url).call()?)
+}
+
+/// Asks an address with a body of GeoJSON; every status is an answer.
+pub fn post_geojson(url: &str, body: &str) -> Result<Answer> {
+    let request = agent()
+        .post(url)
+        .header("content-type", "application/geo+json");
+    read(request.send(body)?)
+}
+
+fn agent() -> ureq::Agent {
+    ureq::Agent::config_builder()
         .http_status_as_error(false)
         .timeout_global(Some(Duration::from_mins(2)))
         .build()
-        .into();
-    let mut response = agent.get(url).call()?;
+        .into()
+}
+
+fn read(mut response: ureq::http::Response<ureq::Body>) -> Result<Answer> {
     let header = |name: &str| {
         let value = response.headers().get(name)?;
         value.to_str().ok().map(ToOwned::to_owned)

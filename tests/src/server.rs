@@ -83,6 +83,11 @@ impl Server {
     pub fn get(&self, path: &str) -> Result<Answer> {
         http::get(&format!("{}{path}", self.url))
     }
+
+    /// Asks a path with a body of GeoJSON; every status is an answer.
+    pub fn post_geojson(&self, path: &str, body: &str) -> Result<Answer> {
+        http::post_geojson(&format!("{}{path}", self.url), body)
+    }
 }
 
 impl Drop for Server {

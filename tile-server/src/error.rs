@@ -91,9 +91,23 @@ pub enum ServerError {
     /// Only reading is possible.
     #[error("this address can be read only: use GET or HEAD")]
     ReadOnly,
-    /// The request carries more than an address.
-    #[error("requests carry at most {limit_bytes} bytes")]
+    /// Only asking is possible, with a geometry or without.
+    #[error("this address can be asked only: use GET or HEAD, or POST with GeoJSON")]
+    AskedOnly,
+    /// The request carries more than is read.
+    #[error("requests to this address carry at most {limit_bytes} bytes")]
     BodyTooLarge { limit_bytes: u64 },
+    /// What the request carries is said to be something else than a geometry.
+    #[error(
+        "geometries are sent as they are, as content-type application/geo+json or application/json"
+    )]
+    NoGeoJson,
+    /// What the request carries cannot be taken apart.
+    #[error("the body is not valid: {reason}")]
+    Body { reason: String },
+    /// The client has the answer.
+    #[error("the answer is still the one that has this tag")]
+    Unchanged,
     /// More work than the queue takes.
     #[error("there is too much to do at the moment; please try again in a moment")]
     Busy,
@@ -139,6 +153,7 @@ impl ServerError {
         match self {
             Self::Contract(_)
             | Self::Address { .. }
+            | Self::Body { .. }
             | Self::Missing { .. }
             | Self::NoVector { .. } => StatusCode::BAD_REQUEST,
             Self::UnknownProduct { .. }
@@ -148,7 +163,9 @@ impl ServerError {
             | Self::UnknownMode { .. }
             | Self::UnknownAddress
             | Self::NoObservations => StatusCode::NOT_FOUND,
-            Self::ReadOnly => StatusCode::METHOD_NOT_ALLOWED,
+            Self::ReadOnly | Self::AskedOnly => StatusCode::METHOD_NOT_ALLOWED,
+            Self::NoGeoJson => StatusCode::UNSUPPORTED_MEDIA_TYPE,
+            Self::Unchanged => StatusCode::PRECONDITION_FAILED,
             Self::BodyTooLarge { .. } => StatusCode::PAYLOAD_TOO_LARGE,
             Self::NoRange { .. } => StatusCode::RANGE_NOT_SATISFIABLE,
             Self::Busy
@@ -224,7 +241,11 @@ impl IntoResponse for ServerError {
             headers.insert(header::UPGRADE, HeaderValue::from_static("websocket"));
         }
         if status == StatusCode::METHOD_NOT_ALLOWED {
-            headers.insert(header::ALLOW, HeaderValue::from_static("GET, HEAD"));
+            let allowed = match self {
+                Self::AskedOnly => "GET, HEAD, POST",
+                _ => "GET, HEAD",
+            };
+            headers.insert(header::ALLOW, HeaderValue::from_static(allowed));
         }
         response
     }

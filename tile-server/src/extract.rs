@@ -92,6 +92,17 @@ impl<'de> Visitor<'de> for NoOthers {
     }
 }
 
+/// # Errors
+/// One of some parameters, which say what the request carries, is there too.
+pub(crate) fn left_out(are_there: &[(&'static str, bool)]) -> Result<(), ServerError> {
+    match are_there.iter().find(|(_name, is_there)| *is_there) {
+        None => Ok(()),
+        Some((name, _)) => Err(ServerError::Address {
+            reason: format!("the geometry is in the body: leave {name} out"),
+        }),
+    }
+}
+
 /// A whole number, decimal digits only.
 pub(crate) fn whole_number(
     what: &'static str,

@@ -18,6 +18,8 @@
 //!
 //! Tiles, views, TileJSON and legends take how a picture is to look, in the unit people read (`look.rs`).
 //!
+//! A geometry that no address has room for is sent along by POST (`bodies.rs`), which asks what GET asks.
+//!
 //! `/zarr/PRODUCT` is the product's cube by keys of Zarr, as it lies in the store (`cubes.rs`).
 //!
 //! Left out on purpose: drawing and computing, which come in through the traits of [`backend`].
@@ -27,6 +29,7 @@ mod allowance;
 mod analyses;
 mod annotations;
 pub mod backend;
+mod bodies;
 mod catalogue;
 mod client;
 pub mod config;

@@ -73,6 +73,8 @@ pub struct Metrics {
     pub refused: IntCounter,
     /// Questions that wait for their turn to be worked at.
     pub analyses_waiting: IntGauge,
+    /// Bytes of geometries whose questions are under way.
+    pub(crate) body_bytes: IntGauge,
     /// Pictures that were drawn and not stored, by why not.
     pub not_stored: IntCounterVec,
     /// Failed reads of the store.
@@ -164,6 +166,10 @@ impl Metrics {
                 "Requests sent away because too many waited.",
             )?,
             analyses_waiting: gauge("analyses_waiting", "Questions that wait for their turn.")?,
+            body_bytes: gauge(
+                "body_bytes",
+                "Bytes of geometries that were sent along, and whose questions are under way.",
+            )?,
             not_stored: counters(
                 "not_stored_total",
                 "Pictures drawn and not stored.",

@@ -27,7 +27,8 @@ const RETRY_AFTER: &str = "Seconds after which the same request may succeed";
     info(
         title = "Fluxglobe",
         description = "Map tiles, views of the globe, series, carbon budgets, the catalogue and observations.\n\n\
-            Everything is read with GET or HEAD, by anybody; other methods are answered with 405. Times are ISO 8601 and \
+            Everything is read with GET or HEAD, by anybody; other methods are answered with 405. Where a geometry may be too long \
+            for an address, POST with it as the body asks the same and writes nothing. Times are ISO 8601 and \
             any instant is valid, not only stored steps; `from` and `to` bound the half-open period `[from, to)`. \
             Answers about a product name its version in `manifest`, and the parameter of that name asks for it again. \
             Every refusal is a `Refusal`; those with `Retry-After` may succeed later."
@@ -46,12 +47,18 @@ const RETRY_AFTER: &str = "Seconds after which the same request may succeed";
         openapi::get,
         point::get,
         line::get,
+        line::post,
         area::get,
+        area::post,
         analysis::get,
+        analysis::post,
         correlation::get,
+        correlation::post,
         difference::get,
+        difference::post,
         hovmoller::get,
         budget::get,
+        budget::post,
         budget::history,
         check::get,
         zarr::get,
@@ -74,6 +81,7 @@ const RETRY_AFTER: &str = "Seconds after which the same request may succeed";
         contract::time::TimeStep,
         words::Background,
         words::BaseMap,
+        words::GeoJson,
         words::LegendForm,
         words::Mode,
         words::Palette,
@@ -86,7 +94,7 @@ const RETRY_AFTER: &str = "Seconds after which the same request may succeed";
         (name = "observations", description = "Buoys, ships, stations and profiles"),
         (name = "operation", description = "For those who run the server"),
     ),
-    modifiers(&Refusals),
+    modifiers(&Refusals, &SentAlong),
 )]
 struct Description;
 
@@ -96,13 +104,33 @@ struct Refusals;
 impl Modify for Refusals {
     fn modify(&self, description: &mut utoipa::openapi::OpenApi) {
         let items = description.paths.paths.values_mut();
-        for operation in items.filter_map(|item| item.get.as_mut()) {
+        let operations = items.flat_map(|item| item.get.iter_mut().chain(&mut item.post));
+        for operation in operations {
             for (status, response) in refusals(operation) {
                 let answers = &mut operation.responses.responses;
                 answers
                     .entry(status.to_owned())
                     .or_insert_with(|| response.into());
             }
+        }
+    }
+}
+
+/// Takes the parameters out of what is asked by POST that the body stands for.
+struct SentAlong;
+
+/// What says where in an address.
+const PLACES: [&str; 4] = ["region", "line", "lon", "lat"];
+
+impl Modify for SentAlong {
+    fn modify(&self, description: &mut utoipa::openapi::OpenApi) {
+        let items = description.paths.paths.values_mut();
+        for operation in items.filter_map(|item| item.post.as_mut()) {
+            let parameters = operation.parameters.get_or_insert_default();
+            let is = |one: &RefOr<Parameter>, names: &[&str]| matches!(one, RefOr::T(one) if names.contains(&one.name.as_str()));
+            // Where parts are taken too, either may be sent and the other stand in the address.
+            let takes_parts = parameters.iter().any(|one| is(one, &["regions"]));
+            parameters.retain(|one| takes_parts || !is(one, &PLACES));
         }
     }
 }
@@ -126,6 +154,13 @@ fn refusals(operation: &Operation) -> Vec<(&'static str, Response)> {
         ),
         ("504", refusal("The answer took too long", true)),
     ];
+    if operation.request_body.is_some() {
+        let text = "The answer is still the one whose tag `If-None-Match` names";
+        all.push(("412", refusal(text, false)));
+        all.push(("413", refusal("The body is longer than 64 MiB", false)));
+        let text = "The body is not said to be GeoJSON, or is compressed";
+        all.push(("415", refusal(text, false)));
+    }
     if takes(&ParameterIn::Path) || takes(&ParameterIn::Query) {
         let text = "A parameter is not valid, or missing; the reason says what would be";
         all.push(("400", refusal(text, false)));

@@ -16,7 +16,8 @@ use tower_http::cors::{Any, CorsLayer};
 
 use crate::client;
 use crate::error::ServerError;
-use crate::middleware::{body, panics::CountPanics, security, tag, track};
+use crate::middleware::body::{self, Takes};
+use crate::middleware::{panics::CountPanics, security, tag, track};
 use crate::routes::picture::{COVERED, HEIGHTS_END, HEIGHTS_WITHIN, SHOWN_TIME, TILT_WITH_GROUND};
 use crate::routes::{
     analysis, area, budget, check, correlation, difference, events, globe, health, hovmoller,
@@ -31,12 +32,16 @@ fn compressible() -> impl Predicate {
     DefaultPredicate::new().and(is_no_chunk)
 }
 
-/// The whole server as one service.
-pub fn router(state: AppState) -> Router {
-    // Map clients on other pages may read everything here: nothing is private and nobody logs in.
-    let other_origins = CorsLayer::new()
+/// Map clients on other pages may read everything here: nothing is private and nobody logs in.
+fn other_origins(takes: Takes) -> CorsLayer {
+    let layer = match takes {
+        Takes::Nothing => CorsLayer::new().allow_methods([Method::GET, Method::HEAD]),
+        Takes::Geometries => CorsLayer::new()
+            .allow_methods([Method::GET, Method::HEAD, Method::POST])
+            .allow_headers([header::CONTENT_TYPE]),
+    };
+    layer
         .allow_origin(Any)
-        .allow_methods([Method::GET, Method::HEAD])
         // Everybody gets the same headers: caches on the way need one copy for all pages.
         .vary([])
         .expose_headers([
@@ -46,26 +51,62 @@ pub fn router(state: AppState) -> Router {
             HEIGHTS_WITHIN,
             TILT_WITH_GROUND,
             header::CONTENT_LOCATION,
-        ]);
+        ])
+}
+
+/// Addresses that POST asks too: a geometry that no address has room for is sent along. Nothing is stored of it.
+fn of_geometries() -> Router<AppState> {
+    Router::new()
+        .route(
+            "/api/products/{product}/line",
+            get(line::get).post(line::post),
+        )
+        .route(
+            "/api/products/{product}/area",
+            get(area::get).post(area::post),
+        )
+        .route(
+            "/api/products/{product}/analysis",
+            get(analysis::get).post(analysis::post),
+        )
+        .route(
+            "/api/products/{product}/correlation",
+            get(correlation::get).post(correlation::post),
+        )
+        .route(
+            "/api/products/{product}/difference",
+            get(difference::get).post(difference::post),
+        )
+        .route(
+            "/api/products/{product}/budget",
+            get(budget::get).post(budget::post),
+        )
+        .method_not_allowed_fallback(async || ServerError::AskedOnly)
+}
+
+/// The whole server as one service.
+pub fn router(state: AppState) -> Router {
     // What a request waited for goes on after its time only if somebody else waits for it too, or comes again (`pictures.rs`).
     let limit_s = state.settings.request_limit_s;
     let timed_out = move |_elapsed: BoxError| async move { ServerError::TimedOut { limit_s } };
-    let layers = ServiceBuilder::new()
-        .layer(from_fn_with_state(state.clone(), track::count))
-        .map_response(security::with_headers)
-        .layer(other_origins)
-        .layer(CompressionLayer::new().compress_when(compressible()))
-        .layer(CatchPanicLayer::custom(CountPanics(
-            state.metrics.panics.clone(),
-        )))
-        .layer(HandleErrorLayer::new(timed_out))
-        .layer(TimeoutLayer::new(Duration::from_secs(limit_s)))
-        .layer(from_fn(body::limit))
-        .layer(from_fn_with_state(
-            state.settings.client_header.clone(),
-            client::remember,
-        ))
-        .layer(from_fn(tag::tagged));
+    let layers = |takes: Takes| {
+        ServiceBuilder::new()
+            .layer(from_fn_with_state(state.clone(), track::count))
+            .map_response(security::with_headers)
+            .layer(other_origins(takes))
+            .layer(CompressionLayer::new().compress_when(compressible()))
+            .layer(CatchPanicLayer::custom(CountPanics(
+                state.metrics.panics.clone(),
+            )))
+            .layer(HandleErrorLayer::new(timed_out))
+            .layer(TimeoutLayer::new(Duration::from_secs(limit_s)))
+            .layer(from_fn_with_state(takes, body::limit))
+            .layer(from_fn_with_state(
+                state.settings.client_header.clone(),
+                client::remember,
+            ))
+            .layer(from_fn(tag::tagged))
+    };
     Router::new()
         .route("/tiles/{product}/{mode_json}", get(tilejson::get))
         .route("/tiles/{product}/{mode}/{z}/{x}/{y_png}", get(tiles::get))
@@ -73,13 +114,7 @@ pub fn router(state: AppState) -> Router {
         .route("/stream", get(stream::get))
         .route("/api/products", get(products::list))
         .route("/api/products/{product}/point", get(point::get))
-        .route("/api/products/{product}/line", get(line::get))
-        .route("/api/products/{product}/area", get(area::get))
-        .route("/api/products/{product}/analysis", get(analysis::get))
-        .route("/api/products/{product}/correlation", get(correlation::get))
-        .route("/api/products/{product}/difference", get(difference::get))
         .route("/api/products/{product}/hovmoller", get(hovmoller::get))
-        .route("/api/products/{product}/budget", get(budget::get))
         .route(
             "/api/products/{product}/budget/history",
             get(budget::history),
@@ -101,6 +136,7 @@ pub fn router(state: AppState) -> Router {
         .route("/metrics", get(metrics::get))
         .method_not_allowed_fallback(async || ServerError::ReadOnly)
         .fallback(viewer::get)
-        .layer(layers)
+        .layer(layers(Takes::Nothing))
+        .merge(of_geometries().layer(layers(Takes::Geometries)))
         .with_state(state)
 }

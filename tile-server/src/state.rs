@@ -10,6 +10,7 @@ use storage::log::EventLog;
 use crate::addresses::Addresses;
 use crate::analyses::Analyses;
 use crate::backend::{Analyse, Draw, Observe};
+use crate::bodies::Bodies;
 use crate::catalogue::Catalogue;
 use crate::config::Settings;
 use crate::cubes::Cubes;
@@ -38,6 +39,8 @@ pub struct Parts {
     pub(crate) addresses: Addresses,
     /// Series and budgets.
     pub analyses: Analyses,
+    /// Geometries that are sent along.
+    pub(crate) bodies: Bodies,
     /// Asked directly only whether it is ready.
     pub drawer: Arc<dyn Draw>,
     /// Finds observations, where there are any.
@@ -97,6 +100,7 @@ impl AppState {
             pictures: Pictures::new(store, Arc::clone(&drawer), draws, &limits, metrics.clone()),
             addresses: Addresses::default(),
             analyses: Analyses::new(analyst, analyses, metrics.clone()),
+            bodies: Bodies::new(metrics.body_bytes.clone()),
             drawer,
             observer: OnceLock::new(),
             observing,

@@ -129,7 +129,8 @@ async fn a_line_is_analysed_as_its_mean_by_length_is_told() {
     let SeriesQuery::Line(query) = &own else {
         panic!("no line");
     };
-    let told = statistics_of(&engine, &query.statistics(), &manifest, id.clone());
+    let asked = query.statistics();
+    let told = statistics_of(&engine, &asked, &manifest, id.clone());
     let told = told.await.unwrap();
     assert_eq!(found.place.line.as_deref(), Some("-132,-15.5;-124,-15.5"));
     assert_eq!((found.place.region, found.place.cell), (None, None));

@@ -17,8 +17,9 @@ const MOST_BYTES: u64 = 64 << 20;
 
 /// Gives a tag to each answer that has none and is to be asked for again every time.
 pub(crate) async fn tagged(request: Request, next: Next) -> Result<Response, ServerError> {
-    // What HEAD is answered with has no bytes to make a tag of, or none of GET's.
-    if request.method() != Method::GET {
+    // What HEAD is answered with has no bytes to make a tag of, or none of GET's. POST asks here as GET does.
+    let is_post = request.method() == Method::POST;
+    if request.method() != Method::GET && !is_post {
         return Ok(next.run(request).await);
     }
     let asked: HeaderMap = request.headers().clone();
@@ -43,6 +44,12 @@ pub(crate) async fn tagged(request: Request, next: Next) -> Result<Response, Ser
     // Weak: it may be sent compressed or not.
     let tag = format!("W/\"{}\"", Digest::of(&content));
     let value = HeaderValue::try_from(&tag).expect("digits are printable");
+    if is_post && has_tag(&asked, &tag) {
+        // 304 belongs to GET and HEAD (RFC 9110, 13.1.2).
+        let mut unchanged = ServerError::Unchanged.into_response();
+        unchanged.headers_mut().insert(header::ETAG, value);
+        return Ok(unchanged);
+    }
     parts.headers.insert(header::ETAG, value);
     if has_tag(&asked, &tag) {
         parts.headers.remove(header::CONTENT_LENGTH);

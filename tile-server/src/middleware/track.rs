@@ -127,6 +127,7 @@ fn method_label(method: &Method) -> &'static str {
     match *method {
         Method::GET => "GET",
         Method::HEAD => "HEAD",
+        Method::POST => "POST",
         Method::OPTIONS => "OPTIONS",
         _ => "other",
     }

@@ -46,6 +46,27 @@ words! {
     LegendForm = legend::Form::ALL.map(legend::Form::as_str);
 }
 
+/// A geometry as it is sent along.
+pub(crate) enum GeoJson {}
+
+impl PartialSchema for GeoJson {
+    fn schema() -> RefOr<Schema> {
+        let text =
+            "A geometry, a `Feature` or a `FeatureCollection` (RFC 7946): polygons, or lines.";
+        ObjectBuilder::new()
+            .description(Some(text))
+            .property("type", ObjectBuilder::new().schema_type(Type::String))
+            .required("type")
+            .into()
+    }
+}
+
+impl ToSchema for GeoJson {
+    fn name() -> Cow<'static, str> {
+        Cow::Borrowed("GeoJson")
+    }
+}
+
 /// A half-open period `[start, end)`.
 pub(crate) enum Period {}
 

@@ -1,19 +1,25 @@
 //! `/api/products/{product}/analysis`: climatology, anomaly, trend, season and extremes of the series of a cell, a region or a line.
 
 use axum::Json;
+use axum::body::Body;
 use axum::extract::State;
-use axum::http::header;
+use axum::http::{HeaderMap, header};
 use axum::response::{IntoResponse as _, Response};
 use contract::analysis::{AnalysisPart, AnalysisWishes, SeriesAnalysis, SeriesQuery, SeriesWishes};
+use contract::geometry::AskedLine;
+use contract::geometry_text;
 use contract::grid::LonLatDeg;
+use contract::region::AskedRegion;
 use contract::time::TimeStep;
 use serde::Deserialize;
 use utoipa::IntoParams;
 
 use crate::backend::{SeriesQuestion, Version};
+use crate::bodies::Room;
 use crate::catalogue::Layer;
 use crate::error::ServerError;
-use crate::extract::{UrlPath, UrlQuery, number, parsed, time};
+use crate::extract::{UrlPath, UrlQuery, left_out, number, parsed, time};
+use crate::openapi::words::GeoJson;
 use crate::routes::budget::ocean;
 use crate::state::AppState;
 
@@ -73,9 +79,48 @@ pub(crate) async fn get(
     UrlPath(product): UrlPath<String>,
     UrlQuery(asked): UrlQuery<AnalysisParameters>,
 ) -> Result<Response, ServerError> {
+    answered(&state, &product, &asked, None).await
+}
+
+/// The same of a region or a line that is sent along: the answer of GET with its text as `region` or `line`.
+#[utoipa::path(
+    post,
+    path = "/api/products/{product}/analysis",
+    operation_id = "analysis_of",
+    tag = "statistics",
+    params(("product" = String, Path, description = "Name of the product"), AnalysisParameters),
+    request_body(
+        description = "The region, or the line, in place of the parameter of that name, as GeoJSON of at most 64 MiB and a million vertices",
+        content((GeoJson = "application/geo+json"), (GeoJson = "application/json")),
+    ),
+    responses((status = 200, description = "What was asked for, each part by itself", body = SeriesAnalysis)),
+)]
+pub(crate) async fn post(
+    State(state): State<AppState>,
+    headers: HeaderMap,
+    UrlPath(product): UrlPath<String>,
+    UrlQuery(asked): UrlQuery<AnalysisParameters>,
+    body: Body,
+) -> Result<Response, ServerError> {
+    left_out(&[
+        ("region", asked.region.is_some()),
+        ("line", asked.line.is_some()),
+        ("lon", asked.lon.is_some()),
+        ("lat", asked.lat.is_some()),
+    ])?;
+    let (sent, _room) = SentPlace::take(&state, &headers, body).await?;
+    answered(&state, &product, &asked, Some(sent)).await
+}
+
+async fn answered(
+    state: &AppState,
+    product: &str,
+    asked: &AnalysisParameters,
+    sent: Option<SentPlace>,
+) -> Result<Response, ServerError> {
     let layer = state
         .catalogue
-        .version(&product, asked.manifest.as_deref())
+        .version(product, asked.manifest.as_deref())
         .await?;
     let parts = asked.parts.as_deref().unwrap_or_default().split(',');
     let parts = parts
@@ -96,11 +141,12 @@ pub(crate) async fn get(
         period: [asked.from.as_deref(), asked.to.as_deref()],
         earth: asked.earth.as_deref(),
         ocean: asked.ocean.as_deref(),
+        sent,
     };
-    let series = text.query(&state, &layer).await?;
+    let series = text.query(state, &layer).await?;
     let of = version(&layer);
     answer(
-        &state,
+        state,
         SeriesQuestion::Analysis {
             of,
             series,
@@ -120,12 +166,39 @@ pub(crate) struct SeriesText<'a> {
     pub(crate) period: [Option<&'a str>; 2],
     pub(crate) earth: Option<&'a str>,
     pub(crate) ocean: Option<&'a str>,
+    /// What came with the request.
+    pub(crate) sent: Option<SentPlace>,
+}
+
+/// Where a series is taken, as it is sent along with a request.
+pub(crate) enum SentPlace {
+    Region(AskedRegion),
+    Line(AskedLine),
+}
+
+impl SentPlace {
+    /// That of a body, whichever it is, and the room that it takes.
+    pub(crate) async fn take(
+        state: &AppState,
+        headers: &HeaderMap,
+        body: Body,
+    ) -> Result<(Self, Room), ServerError> {
+        let sent = state.bodies.take(headers, body).await?;
+        let read = |text: String| {
+            Ok(if geometry_text::is_line(&text) {
+                Self::Line(text.parse()?)
+            } else {
+                Self::Region(text.parse()?)
+            })
+        };
+        sent.read(read).await
+    }
 }
 
 impl SeriesText<'_> {
     /// The question, if it can be asked of a version.
     pub(crate) async fn query(
-        &self,
+        self,
         state: &AppState,
         layer: &Layer,
     ) -> Result<SeriesQuery, ServerError> {
@@ -142,10 +215,15 @@ impl SeriesText<'_> {
             }
             [Some(_), None] | [None, Some(_)] => return Err(missing),
         };
+        let (region, line) = match self.sent {
+            Some(SentPlace::Region(region)) => (Some(region), None),
+            Some(SentPlace::Line(line)) => (None, Some(line)),
+            None => (parsed(self.region)?, parsed(self.line)?),
+        };
         let wishes = SeriesWishes {
             place,
-            region: parsed(self.region)?,
-            line: parsed(self.line)?,
+            region,
+            line,
             from: time(self.period[0])?,
             to: time(self.period[1])?,
             earth: parsed(self.earth)?,

@@ -1,11 +1,12 @@
 //! `/api/products/{product}/area`: the mean of a product over a region, step by step, with what it is a mean of; or other
 //! statistics of it.
 
+use axum::body::Body;
 use axum::extract::State;
 use axum::http::HeaderMap;
 use axum::response::Response;
 use contract::earth::Earth;
-use contract::region::Cells;
+use contract::region::{AskedRegion, Cells};
 use contract::rows::RowsForm;
 use contract::series::RegionSeries;
 use contract::statistics::{RegionQuestion, StatisticsWishes};
@@ -14,7 +15,8 @@ use serde::Deserialize;
 use utoipa::IntoParams;
 
 use crate::error::ServerError;
-use crate::extract::{UrlPath, UrlQuery, parsed};
+use crate::extract::{UrlPath, UrlQuery, left_out, parsed};
+use crate::openapi::words::GeoJson;
 use crate::routes::budget::ocean;
 use crate::routes::statistics::{SeriesOrStatistics, StatisticsText, answer, form, response};
 use crate::state::AppState;
@@ -77,15 +79,60 @@ pub(crate) async fn get(
     UrlPath(product): UrlPath<String>,
     UrlQuery(asked): UrlQuery<AreaParameters>,
 ) -> Result<Response, ServerError> {
-    let form = form(asked.format.as_deref(), &headers)?;
-    let named = asked.manifest.as_deref();
-    let layer = state.catalogue.version(&product, named).await?;
     let Some(region) = asked.region.as_deref() else {
         return Err(ServerError::Missing {
             name: "region",
             wanted: "global, a name that /api/regions lists, west,south,east,north in degrees, GeoJSON or WKT text",
         });
     };
+    let region = region.parse()?;
+    answered(&state, &headers, &product, &asked, region).await
+}
+
+/// The same of a region that is sent along: the answer of GET with its text as `region`.
+#[utoipa::path(
+    post,
+    path = "/api/products/{product}/area",
+    operation_id = "area_of",
+    tag = "statistics",
+    params(("product" = String, Path, description = "Name of the product"), AreaParameters),
+    request_body(
+        description = "The region in place of the parameter of that name, as GeoJSON of at most 64 MiB and a million vertices",
+        content((GeoJson = "application/geo+json"), (GeoJson = "application/json")),
+    ),
+    responses((
+        status = 200,
+        description = "One mean for each step; statistics where they are asked for",
+        content(
+            (inline(SeriesOrStatistics<RegionSeries>) = "application/json"),
+            (String = "text/csv"),
+            ("application/vnd.apache.arrow.file"),
+        ),
+    )),
+)]
+pub(crate) async fn post(
+    State(state): State<AppState>,
+    headers: HeaderMap,
+    UrlPath(product): UrlPath<String>,
+    UrlQuery(asked): UrlQuery<AreaParameters>,
+    body: Body,
+) -> Result<Response, ServerError> {
+    left_out(&[("region", asked.region.is_some())])?;
+    let sent = state.bodies.take(&headers, body).await?;
+    let (region, _room) = sent.read(|text| Ok(text.parse::<AskedRegion>()?)).await?;
+    answered(&state, &headers, &product, &asked, region).await
+}
+
+async fn answered(
+    state: &AppState,
+    headers: &HeaderMap,
+    product: &str,
+    asked: &AreaParameters,
+    region: AskedRegion,
+) -> Result<Response, ServerError> {
+    let form = form(asked.format.as_deref(), headers)?;
+    let named = asked.manifest.as_deref();
+    let layer = state.catalogue.version(product, named).await?;
     let text = StatisticsText {
         statistic: asked.statistic.as_deref(),
         step: asked.step.as_deref(),
@@ -96,12 +143,12 @@ pub(crate) async fn get(
     };
     let wishes = StatisticsWishes {
         cells: parsed(asked.cells.as_deref())?,
-        ocean: ocean(&state, asked.ocean.as_deref()).await?,
+        ocean: ocean(state, asked.ocean.as_deref()).await?,
         ..text.wishes()?
     };
     let product = layer.manifest.product.clone();
-    let query = match wishes.over_region(product, region.parse()?) {
-        RegionQuestion::Statistics(query) => return answer(&state, &layer, query, form).await,
+    let query = match wishes.over_region(product, region) {
+        RegionQuestion::Statistics(query) => return answer(state, &layer, query, form).await,
         RegionQuestion::Series(query) => query,
     };
     // What cannot be asked waits for no turn.

@@ -5,22 +5,25 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use axum::Json;
+use axum::body::Body;
 use axum::extract::State;
-use axum::http::header;
+use axum::http::{HeaderMap, header};
 use axum::response::{IntoResponse as _, Response};
 use contract::budget::{
-    AsOf, BudgetAnswer, BudgetHistory, BudgetQuery, BudgetWishes, BudgetWords, ErrorWords,
+    AsOf, Besides, BudgetAnswer, BudgetHistory, BudgetQuery, BudgetWishes, BudgetWords, ErrorWords,
 };
 use contract::earth::Earth;
+use contract::geometry_text;
 use contract::manifest::Manifest;
-use contract::region::Cells;
+use contract::region::{AskedRegion, Cells};
 use contract::time::TimeStep;
 use serde::Deserialize;
 use utoipa::IntoParams;
 
 use crate::catalogue::Layer;
 use crate::error::ServerError;
-use crate::extract::{UrlPath, UrlQuery, number, parsed, time, whole_number};
+use crate::extract::{UrlPath, UrlQuery, left_out, number, parsed, time, whole_number};
+use crate::openapi::words::GeoJson;
 use crate::state::AppState;
 
 #[derive(Debug, Deserialize, IntoParams)]
@@ -75,11 +78,30 @@ pub(crate) struct BudgetParameters {
     regions: Option<String>,
 }
 
+/// Where, and what is asked besides.
+struct Read {
+    region: Option<AskedRegion>,
+    besides: Besides,
+}
+
 impl BudgetParameters {
-    /// The question about a version.
-    async fn query(&self, state: &AppState, layer: &Layer) -> Result<BudgetQuery, ServerError> {
-        let wishes = BudgetWishes {
+    /// What it is about, read from texts.
+    fn read(&self) -> Result<Read, ServerError> {
+        Ok(Read {
             region: parsed(self.region.as_deref())?,
+            besides: self.words()?.asked()?,
+        })
+    }
+
+    /// The question about a version.
+    async fn query(
+        &self,
+        state: &AppState,
+        layer: &Layer,
+        Read { region, besides }: Read,
+    ) -> Result<BudgetQuery, ServerError> {
+        let wishes = BudgetWishes {
+            region,
             from: time(self.from.as_deref())?,
             to: time(self.to.as_deref())?,
             step: parsed(self.step.as_deref())?,
@@ -88,7 +110,6 @@ impl BudgetParameters {
             ocean: ocean(state, self.ocean.as_deref()).await?,
         };
         let query = wishes.query(layer.manifest.product.clone());
-        let besides = self.words()?.asked()?;
         let mut versions = BTreeMap::new();
         for product in besides.products() {
             let layer = state.catalogue.version(product.as_str(), None).await?;
@@ -145,6 +166,55 @@ pub(crate) async fn get(
     UrlPath(product): UrlPath<String>,
     UrlQuery(asked): UrlQuery<BudgetParameters>,
 ) -> Result<Response, ServerError> {
+    let read = asked.read()?;
+    answered(&state, &product, &asked, read).await
+}
+
+/// The same of a region that is sent along, or in parts that are: the answer of GET with the text as `region`, or as `regions` if it
+/// is a `FeatureCollection`.
+#[utoipa::path(
+    post,
+    path = "/api/products/{product}/budget",
+    operation_id = "budget_of",
+    tag = "statistics",
+    params(("product" = String, Path, description = "Name of a carbon flux or of accumulated carbon"), BudgetParameters),
+    request_body(
+        description = "The region, or a `FeatureCollection` of parts with names, in place of the parameter of that name, as GeoJSON of at most 64 MiB and a million vertices",
+        content((GeoJson = "application/geo+json"), (GeoJson = "application/json")),
+    ),
+    responses((status = 200, description = "One row for each step of time", body = BudgetAnswer)),
+)]
+pub(crate) async fn post(
+    State(state): State<AppState>,
+    headers: HeaderMap,
+    UrlPath(product): UrlPath<String>,
+    UrlQuery(mut asked): UrlQuery<BudgetParameters>,
+    body: Body,
+) -> Result<Response, ServerError> {
+    let sent = state.bodies.take(&headers, body).await?;
+    let read = move |text: String| {
+        let (name, own) = if geometry_text::is_collection(&text) {
+            ("regions", &mut asked.regions)
+        } else {
+            ("region", &mut asked.region)
+        };
+        left_out(&[(name, own.is_some())])?;
+        *own = Some(text);
+        let read = asked.read()?;
+        // What they said is read.
+        (asked.region, asked.regions) = (None, None);
+        Ok((asked, read))
+    };
+    let ((asked, read), _room) = sent.read(read).await?;
+    answered(&state, &product, &asked, read).await
+}
+
+async fn answered(
+    state: &AppState,
+    product: &str,
+    asked: &BudgetParameters,
+    read: Read,
+) -> Result<Response, ServerError> {
     let as_of: Option<AsOf> = parsed(asked.as_of.as_deref())?;
     let layer = match (&as_of, asked.manifest.as_deref()) {
         (Some(_), Some(_)) => {
@@ -152,10 +222,10 @@ pub(crate) async fn get(
                 reason: "manifest and as_of both say which version is meant: give one".to_owned(),
             });
         }
-        (Some(as_of), None) => state.catalogue.as_of(&product, as_of).await?,
-        (None, named) => state.catalogue.version(&product, named).await?,
+        (Some(as_of), None) => state.catalogue.as_of(product, as_of).await?,
+        (None, named) => state.catalogue.version(product, named).await?,
     };
-    let query = asked.query(&state, &layer).await?;
+    let query = asked.query(state, &layer, read).await?;
     // What cannot be asked waits for no turn.
     query.steps(&layer.manifest)?;
     let answer = state.analyses.budget(&layer, query).await?;
@@ -182,7 +252,7 @@ pub(crate) async fn history(
         });
     }
     let layer = state.catalogue.version(&product, None).await?;
-    let query = asked.query(&state, &layer).await?;
+    let query = asked.query(&state, &layer, asked.read()?).await?;
     let answer = state.analyses.budget_history(&layer, query).await?;
     Ok(([(header::CACHE_CONTROL, "no-cache")], Json(&*answer)).into_response())
 }

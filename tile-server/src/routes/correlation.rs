@@ -1,6 +1,8 @@
 //! `/api/products/{product}/correlation`: how the series of two products go together, now and later.
 
+use axum::body::Body;
 use axum::extract::State;
+use axum::http::HeaderMap;
 use axum::response::Response;
 use contract::analysis::{Correlation, CorrelationWishes};
 use contract::time::TimeStep;
@@ -9,8 +11,9 @@ use utoipa::IntoParams;
 
 use crate::backend::SeriesQuestion;
 use crate::error::ServerError;
-use crate::extract::{UrlPath, UrlQuery, parsed, whole_number};
-use crate::routes::analysis::{SeriesText, answer, version};
+use crate::extract::{UrlPath, UrlQuery, left_out, parsed, whole_number};
+use crate::openapi::words::GeoJson;
+use crate::routes::analysis::{SentPlace, SeriesText, answer, version};
 use crate::state::AppState;
 
 #[derive(Debug, Deserialize, IntoParams)]
@@ -67,9 +70,48 @@ pub(crate) async fn get(
     UrlPath(product): UrlPath<String>,
     UrlQuery(asked): UrlQuery<CorrelationParameters>,
 ) -> Result<Response, ServerError> {
+    answered(&state, &product, &asked, None).await
+}
+
+/// The same of a region or a line that is sent along: the answer of GET with its text as `region` or `line`.
+#[utoipa::path(
+    post,
+    path = "/api/products/{product}/correlation",
+    operation_id = "correlation_of",
+    tag = "statistics",
+    params(("product" = String, Path, description = "Name of the first product"), CorrelationParameters),
+    request_body(
+        description = "The region, or the line, in place of the parameter of that name, as GeoJSON of at most 64 MiB and a million vertices",
+        content((GeoJson = "application/geo+json"), (GeoJson = "application/json")),
+    ),
+    responses((status = 200, description = "One row for each lag", body = Correlation)),
+)]
+pub(crate) async fn post(
+    State(state): State<AppState>,
+    headers: HeaderMap,
+    UrlPath(product): UrlPath<String>,
+    UrlQuery(asked): UrlQuery<CorrelationParameters>,
+    body: Body,
+) -> Result<Response, ServerError> {
+    left_out(&[
+        ("region", asked.region.is_some()),
+        ("line", asked.line.is_some()),
+        ("lon", asked.lon.is_some()),
+        ("lat", asked.lat.is_some()),
+    ])?;
+    let (sent, _room) = SentPlace::take(&state, &headers, body).await?;
+    answered(&state, &product, &asked, Some(sent)).await
+}
+
+async fn answered(
+    state: &AppState,
+    product: &str,
+    asked: &CorrelationParameters,
+    sent: Option<SentPlace>,
+) -> Result<Response, ServerError> {
     let of = state
         .catalogue
-        .version(&product, asked.manifest.as_deref())
+        .version(product, asked.manifest.as_deref())
         .await?;
     let Some(with) = asked.with.as_deref() else {
         let (name, wanted) = ("with", "the name of a second product");
@@ -86,8 +128,9 @@ pub(crate) async fn get(
         period: [asked.from.as_deref(), asked.to.as_deref()],
         earth: asked.earth.as_deref(),
         ocean: None,
+        sent,
     };
-    let series = series.query(&state, &of).await?;
+    let series = series.query(state, &of).await?;
     let max_lag = asked.max_lag.as_deref();
     let wishes = CorrelationWishes {
         step: parsed(asked.step.as_deref())?,
@@ -106,5 +149,5 @@ pub(crate) async fn get(
     };
     let query = wishes.query(series, with.manifest.product.clone())?;
     let (of, with) = (version(&of), version(&with));
-    answer(&state, SeriesQuestion::Correlation { of, with, query }).await
+    answer(state, SeriesQuestion::Correlation { of, with, query }).await
 }

@@ -1,6 +1,8 @@
 //! `/api/products/{product}/difference`: the mean of two periods, versions or products, one less the other.
 
+use axum::body::Body;
 use axum::extract::State;
+use axum::http::HeaderMap;
 use axum::response::Response;
 use contract::analysis::{Difference, DifferenceWishes};
 use serde::Deserialize;
@@ -8,8 +10,9 @@ use utoipa::IntoParams;
 
 use crate::backend::SeriesQuestion;
 use crate::error::ServerError;
-use crate::extract::{UrlPath, UrlQuery, parsed};
-use crate::routes::analysis::{SeriesText, answer, version};
+use crate::extract::{UrlPath, UrlQuery, left_out, parsed};
+use crate::openapi::words::GeoJson;
+use crate::routes::analysis::{SentPlace, SeriesText, answer, version};
 use crate::state::AppState;
 
 #[derive(Debug, Deserialize, IntoParams)]
@@ -56,11 +59,50 @@ pub(crate) async fn get(
     UrlPath(product): UrlPath<String>,
     UrlQuery(asked): UrlQuery<DifferenceParameters>,
 ) -> Result<Response, ServerError> {
+    answered(&state, &product, &asked, None).await
+}
+
+/// The same of a region or a line that is sent along: the answer of GET with its text as `region` or `line`.
+#[utoipa::path(
+    post,
+    path = "/api/products/{product}/difference",
+    operation_id = "difference_of",
+    tag = "statistics",
+    params(("product" = String, Path, description = "Name of the product"), DifferenceParameters),
+    request_body(
+        description = "The region, or the line, in place of the parameter of that name, as GeoJSON of at most 64 MiB and a million vertices",
+        content((GeoJson = "application/geo+json"), (GeoJson = "application/json")),
+    ),
+    responses((status = 200, description = "Both means and their difference", body = Difference)),
+)]
+pub(crate) async fn post(
+    State(state): State<AppState>,
+    headers: HeaderMap,
+    UrlPath(product): UrlPath<String>,
+    UrlQuery(asked): UrlQuery<DifferenceParameters>,
+    body: Body,
+) -> Result<Response, ServerError> {
+    left_out(&[
+        ("region", asked.region.is_some()),
+        ("line", asked.line.is_some()),
+        ("lon", asked.lon.is_some()),
+        ("lat", asked.lat.is_some()),
+    ])?;
+    let (sent, _room) = SentPlace::take(&state, &headers, body).await?;
+    answered(&state, &product, &asked, Some(sent)).await
+}
+
+async fn answered(
+    state: &AppState,
+    product: &str,
+    asked: &DifferenceParameters,
+    sent: Option<SentPlace>,
+) -> Result<Response, ServerError> {
     let of = state
         .catalogue
-        .version(&product, asked.manifest.as_deref())
+        .version(product, asked.manifest.as_deref())
         .await?;
-    let other = asked.minus.as_deref().unwrap_or(&product);
+    let other = asked.minus.as_deref().unwrap_or(product);
     let minus = state
         .catalogue
         .version(other, asked.minus_manifest.as_deref())
@@ -72,8 +114,9 @@ pub(crate) async fn get(
         period: [None, None],
         earth: asked.earth.as_deref(),
         ocean: None,
+        sent,
     };
-    let series = series.query(&state, &of).await?;
+    let series = series.query(state, &of).await?;
     let wishes = DifferenceWishes {
         period: parsed(asked.period.as_deref())?,
         minus_period: parsed(asked.minus_period.as_deref())?,
@@ -83,5 +126,5 @@ pub(crate) async fn get(
         of: (version(&of), series),
         minus: (version(&minus), other),
     };
-    answer(&state, question).await
+    answer(state, question).await
 }

@@ -1,10 +1,11 @@
 //! `/api/products/{product}/line`: statistics of a product along a line, each cell by the length of the line in it.
 
+use axum::body::Body;
 use axum::extract::State;
 use axum::http::HeaderMap;
 use axum::response::Response;
 use contract::earth::Earth;
-use contract::geometry::AskedGeometry;
+use contract::geometry::AskedLine;
 use contract::rows::RowsForm;
 use contract::statistics::StatisticsAnswer;
 use contract::time::TimeStep;
@@ -12,7 +13,8 @@ use serde::Deserialize;
 use utoipa::IntoParams;
 
 use crate::error::ServerError;
-use crate::extract::{UrlPath, UrlQuery};
+use crate::extract::{UrlPath, UrlQuery, left_out};
+use crate::openapi::words::GeoJson;
 use crate::routes::statistics::{StatisticsText, answer, form};
 use crate::state::AppState;
 
@@ -69,17 +71,62 @@ pub(crate) async fn get(
     UrlPath(product): UrlPath<String>,
     UrlQuery(own): UrlQuery<LineParameters>,
 ) -> Result<Response, ServerError> {
-    let form = form(own.format.as_deref(), &headers)?;
-    let layer = state
-        .catalogue
-        .version(&product, own.manifest.as_deref())
-        .await?;
     let Some(line) = own.line.as_deref() else {
         return Err(ServerError::Missing {
             name: "line",
             wanted: "LON,LAT;LON,LAT;... in degrees, GeoJSON or WKT text",
         });
     };
+    let line = line.parse()?;
+    answered(&state, &headers, &product, &own, line).await
+}
+
+/// The same along a line that is sent along: the answer of GET with its text as `line`.
+#[utoipa::path(
+    post,
+    path = "/api/products/{product}/line",
+    operation_id = "line_of",
+    tag = "statistics",
+    params(("product" = String, Path, description = "Name of the product"), LineParameters),
+    request_body(
+        description = "The line in place of the parameter of that name, as GeoJSON of at most 64 MiB and a million vertices",
+        content((GeoJson = "application/geo+json"), (GeoJson = "application/json")),
+    ),
+    responses((
+        status = 200,
+        description = "One row for each bin of time",
+        content(
+            (StatisticsAnswer = "application/json"),
+            (String = "text/csv"),
+            ("application/vnd.apache.arrow.file"),
+        ),
+    )),
+)]
+pub(crate) async fn post(
+    State(state): State<AppState>,
+    headers: HeaderMap,
+    UrlPath(product): UrlPath<String>,
+    UrlQuery(own): UrlQuery<LineParameters>,
+    body: Body,
+) -> Result<Response, ServerError> {
+    left_out(&[("line", own.line.is_some())])?;
+    let sent = state.bodies.take(&headers, body).await?;
+    let (line, _room) = sent.read(|text| Ok(text.parse::<AskedLine>()?)).await?;
+    answered(&state, &headers, &product, &own, line).await
+}
+
+async fn answered(
+    state: &AppState,
+    headers: &HeaderMap,
+    product: &str,
+    own: &LineParameters,
+    line: AskedLine,
+) -> Result<Response, ServerError> {
+    let form = form(own.format.as_deref(), headers)?;
+    let layer = state
+        .catalogue
+        .version(product, own.manifest.as_deref())
+        .await?;
     let text = StatisticsText {
         statistic: own.statistic.as_deref(),
         step: own.step.as_deref(),
@@ -89,6 +136,6 @@ pub(crate) async fn get(
         earth: own.earth.as_deref(),
     };
     let product = layer.manifest.product.clone();
-    let query = text.wishes()?.query(product, AskedGeometry::line(line)?);
-    answer(&state, &layer, query, form).await
+    let query = text.wishes()?.query(product, line.into());
+    answer(state, &layer, query, form).await
 }

@@ -28,6 +28,7 @@ mod observations;
 mod openapi;
 mod palettes;
 mod point;
+mod posted;
 mod products;
 mod properties;
 mod regions;

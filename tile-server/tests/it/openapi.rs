@@ -14,6 +14,7 @@ use crate::app::{Answer, TestApp};
 use crate::doubles::Mood;
 use crate::events::Viewer;
 use crate::observations::{observation, platform};
+use crate::posted::{SQUARE, TRACK, post};
 use crate::schema::problems;
 
 const COMMITTED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/openapi.json");
@@ -165,8 +166,12 @@ fn operation<'a>(description: &'a Value, path: &str) -> &'a Value {
 
 /// Status, content type and body of an answer, held against an operation.
 fn hold(description: &Value, path: &str, address: &str, answer: &Answer) {
+    hold_to(description, operation(description, path), address, answer);
+}
+
+fn hold_to(description: &Value, operation: &Value, address: &str, answer: &Answer) {
     let status = answer.status.as_u16().to_string();
-    let response = &operation(description, path)["responses"][&status];
+    let response = &operation["responses"][&status];
     assert!(
         response.is_object(),
         "{address}: {status} is not described: {}",
@@ -269,6 +274,76 @@ async fn every_answer_is_as_described() {
         ("/api/products", "/api/products"),
     ] {
         hold(&description, path, address, &nothing.get(address).await);
+    }
+}
+
+/// Addresses that take a geometry, a question to each, and what is sent along.
+const SENT: [(&str, &str, &str); 6] = [
+    ("area", "sst/area", SQUARE),
+    ("line", "sst/line", TRACK),
+    ("analysis", "sst/analysis?parts=trend", TRACK),
+    ("correlation", "sst/correlation?with=flux", TRACK),
+    ("difference", "sst/difference?minus=flux", SQUARE),
+    ("budget", "flux/budget", SQUARE),
+];
+
+#[tokio::test]
+async fn what_takes_a_geometry_is_described_and_answers_so() {
+    let app = rich().await;
+    let description = described().await;
+    let paths = description["paths"].as_object().unwrap();
+    let takes = paths
+        .iter()
+        .filter(|(_path, item)| item["post"].is_object());
+    let takes: BTreeSet<&str> = takes.map(|(path, _item)| path.as_str()).collect();
+    let sent = SENT.map(|(name, ..)| format!("/api/products/{{product}}/{name}"));
+    assert_eq!(takes, sent.iter().map(String::as_str).collect());
+    for (name, address, geometry) in SENT {
+        let item = &paths[&format!("/api/products/{{product}}/{name}")];
+        let operation = &item["post"];
+        let types = operation["requestBody"]["content"].as_object().unwrap();
+        let types: Vec<&str> = types.keys().map(String::as_str).collect();
+        assert_eq!(
+            types,
+            ["application/geo+json", "application/json"],
+            "{name}"
+        );
+        let named = |item: &Value| -> BTreeSet<String> {
+            let parameters = item["parameters"].as_array().unwrap().iter();
+            parameters
+                .map(|one| one["name"].as_str().unwrap().to_owned())
+                .collect()
+        };
+        // Of a budget the parts may be sent along, and the region stand in the address.
+        let (by_get, by_post) = (named(&item["get"]), named(operation));
+        let left_out: Vec<_> = by_get.difference(&by_post).map(String::as_str).collect();
+        let wanted: &[&str] = match name {
+            "area" => &["region"],
+            "line" => &["line"],
+            "budget" => &[],
+            _ => &["lat", "line", "lon", "region"],
+        };
+        assert_eq!(left_out, wanted, "{name}");
+        let mut untyped = post(address, geometry);
+        untyped.headers_mut().remove("content-type");
+        let mut large = post(address, geometry);
+        let length = u64::MAX.into();
+        large.headers_mut().insert("content-length", length);
+        let answer = app.send(post(address, geometry)).await;
+        let mut again = post(address, geometry);
+        let tag = answer.headers["etag"].clone();
+        again.headers_mut().insert("if-none-match", tag);
+        for (request, status) in [
+            (post(address, geometry), 200),
+            (post(address, "{}"), 400),
+            (again, 412),
+            (large, 413),
+            (untyped, 415),
+        ] {
+            let answer = app.send(request).await;
+            assert_eq!(answer.status.as_u16(), status, "{name}: {}", answer.text());
+            hold_to(&description, operation, address, &answer);
+        }
     }
 }
 

@@ -136,7 +136,8 @@ export interface paths {
         /** Climatology, anomaly, trend, season and extremes of a series. What is not defined for it stands in `refused` with the reason. */
         get: operations["analysis"];
         put?: never;
-        post?: never;
+        /** The same of a region or a line that is sent along: the answer of GET with its text as `region` or `line`. */
+        post: operations["analysis_of"];
         delete?: never;
         options?: never;
         head?: never;
@@ -153,7 +154,8 @@ export interface paths {
         /** The mean over a region at every step, with its coverage. */
         get: operations["area"];
         put?: never;
-        post?: never;
+        /** The same of a region that is sent along: the answer of GET with its text as `region`. */
+        post: operations["area_of"];
         delete?: never;
         options?: never;
         head?: never;
@@ -170,7 +172,11 @@ export interface paths {
         /** The carbon budget of a region: by month, by year or in all, with its coverage and what gaps would add. */
         get: operations["budget"];
         put?: never;
-        post?: never;
+        /**
+         * The same of a region that is sent along, or in parts that are: the answer of GET with the text as `region`, or as `regions` if it
+         *     is a `FeatureCollection`.
+         */
+        post: operations["budget_of"];
         delete?: never;
         options?: never;
         head?: never;
@@ -201,10 +207,11 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /** The correlation of two products over a region or at a place, at every lag. */
+        /** The correlation of two products over a region, along a line or at a place, at every lag. */
         get: operations["correlation"];
         put?: never;
-        post?: never;
+        /** The same of a region or a line that is sent along: the answer of GET with its text as `region` or `line`. */
+        post: operations["correlation_of"];
         delete?: never;
         options?: never;
         head?: never;
@@ -221,7 +228,8 @@ export interface paths {
         /** The mean over time of one product, version or period less that of another, with its standard error. */
         get: operations["difference"];
         put?: never;
-        post?: never;
+        /** The same of a region or a line that is sent along: the answer of GET with its text as `region` or `line`. */
+        post: operations["difference_of"];
         delete?: never;
         options?: never;
         head?: never;
@@ -272,7 +280,8 @@ export interface paths {
         /** Statistics along a line, by length. */
         get: operations["line"];
         put?: never;
-        post?: never;
+        /** The same along a line that is sent along: the answer of GET with its text as `line`. */
+        post: operations["line_of"];
         delete?: never;
         options?: never;
         head?: never;
@@ -979,6 +988,10 @@ export interface components {
              *     Hyndman and Fan (1996), doi:10.1080/00031305.1996.10473566.
              */
             percentiles: components["schemas"]["Percentile"][];
+        };
+        /** @description A geometry, a `Feature` or a `FeatureCollection` (RFC 7946): polygons, or lines. */
+        GeoJson: {
+            type: string;
         };
         /** @description Places as longitude and latitude, degrees: the last one, or the track of a ship. */
         Geometry: {
@@ -1764,10 +1777,10 @@ export interface components {
             left_out_count?: number;
             /**
              * Format: double
-             * @description Least share of a region's sea that a step had to hold data over, percent.
+             * @description Least share of a region's sea, or of a line, that a step had to hold data over, percent.
              */
             min_coverage_percent?: number;
-            /** @description What may surprise: how the region was taken, steps that cover little of it or were left out, steps without data. */
+            /** @description What may surprise: how the region or line was taken, steps that cover little of it or were left out, steps without data. */
             notes: string[];
             /** @description What was asked for and cannot be said, and why. */
             refused: components["schemas"]["Refused"][];
@@ -1790,9 +1803,11 @@ export interface components {
         };
         /** @description What a series is of. */
         SeriesPlace: {
-            /** @description The cell; none of a region. */
+            /** @description The cell; none of a region or a line. */
             cell?: components["schemas"]["Cell"];
-            /** @description The region that it is the mean over; none of a cell. */
+            /** @description The line that it is the mean along; none of a cell or a region. */
+            line?: string;
+            /** @description The region that it is the mean over; none of a cell or a line. */
             region?: string;
         };
         /** @description A value as a paper prints it. */
@@ -2564,8 +2579,8 @@ export interface operations {
                 /** @description Means that the trend is drawn through; `month` unless told otherwise. */
                 trend_step?: components["schemas"]["TimeStep"];
                 /**
-                 * @description Least coverage, percent: steps that hold data over less of the region's sea are left out, and the answer says how many; 0
-                 *     unless told otherwise.
+                 * @description Least coverage, percent: steps that hold data over less of the region's sea, or of the line, are left out, and the answer says
+                 *     how many; 0 unless told otherwise.
                  */
                 min_coverage?: number;
                 /** @description Longitude of a cell, degrees east, -180 to 360; with `lat`, in place of a region. */
@@ -2574,11 +2589,16 @@ export interface operations {
                 lat?: number;
                 /** @description `global`, a name that `/api/regions` lists, `west,south,east,north` in degrees, GeoJSON or well-known text. */
                 region?: string;
+                /**
+                 * @description `LON,LAT;LON,LAT;...` in degrees, GeoJSON or well-known text, in place of a region: the mean along a line, each cell by the length
+                 *     in it.
+                 */
+                line?: string;
                 /** @description First instant, ISO 8601 UTC; the product's own unless one is given. */
                 from?: string;
                 /** @description First instant after the period; the product's own unless one is given. */
                 to?: string;
-                /** @description Figure of the earth for areas; `wgs84` unless one is given. */
+                /** @description Figure of the earth for areas and lengths; `wgs84` unless one is given. */
                 earth?: components["schemas"]["Earth"];
                 /** @description Landed product whose cells say how much of them is sea or land, in place of Natural Earth. */
                 ocean?: string;
@@ -2614,6 +2634,144 @@ export interface operations {
             };
             /** @description Nothing of that name; the reason says where names are listed */
             404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description A defect of this server */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description A store of others, to which the product is attached, does not hold what it held */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description Too much to do, or a part that is needed does not answer */
+            503: {
+                headers: {
+                    /** @description Seconds after which the same request may succeed */
+                    "retry-after"?: number;
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description The answer took too long */
+            504: {
+                headers: {
+                    /** @description Seconds after which the same request may succeed */
+                    "retry-after"?: number;
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+        };
+    };
+    analysis_of: {
+        parameters: {
+            query: {
+                /** @description What is made of the series: `climatology`, `anomaly`, `trend`, `season`, `extremes`, several with commas. */
+                parts: string;
+                /** @description Years of the climatology, both part of it: `1991/2020`; all that are covered unless given. */
+                base?: string;
+                /** @description Parts of the year of the climatology: `month` (the default), `season` or `day`. */
+                bins?: string;
+                /** @description Means that the trend is drawn through; `month` unless told otherwise. */
+                trend_step?: components["schemas"]["TimeStep"];
+                /**
+                 * @description Least coverage, percent: steps that hold data over less of the region's sea, or of the line, are left out, and the answer says
+                 *     how many; 0 unless told otherwise.
+                 */
+                min_coverage?: number;
+                /** @description First instant, ISO 8601 UTC; the product's own unless one is given. */
+                from?: string;
+                /** @description First instant after the period; the product's own unless one is given. */
+                to?: string;
+                /** @description Figure of the earth for areas and lengths; `wgs84` unless one is given. */
+                earth?: components["schemas"]["Earth"];
+                /** @description Landed product whose cells say how much of them is sea or land, in place of Natural Earth. */
+                ocean?: string;
+                /** @description Version, as answers name it; the newest unless one is given. */
+                manifest?: string;
+            };
+            header?: never;
+            path: {
+                /** @description Name of the product */
+                product: string;
+            };
+            cookie?: never;
+        };
+        /** @description The region, or the line, in place of the parameter of that name, as GeoJSON of at most 64 MiB and a million vertices */
+        requestBody: {
+            content: {
+                "application/geo+json": components["schemas"]["GeoJson"];
+                "application/json": components["schemas"]["GeoJson"];
+            };
+        };
+        responses: {
+            /** @description What was asked for, each part by itself */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["SeriesAnalysis"];
+                };
+            };
+            /** @description A parameter is not valid, or missing; the reason says what would be */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description Nothing of that name; the reason says where names are listed */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description The answer is still the one whose tag `If-None-Match` names */
+            412: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description The body is longer than 64 MiB */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description The body is not said to be GeoJSON, or is compressed */
+            415: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -2793,6 +2951,167 @@ export interface operations {
             };
         };
     };
+    area_of: {
+        parameters: {
+            query?: {
+                /** @description First instant, ISO 8601 UTC; the product's own unless one is given. */
+                from?: string;
+                /** @description First instant after the period; the product's own unless one is given. */
+                to?: string;
+                /** @description Figure of the earth for areas; `wgs84` unless one is given. */
+                earth?: components["schemas"]["Earth"];
+                /** @description Landed product whose cells say how much of them is sea or land, in place of Natural Earth. */
+                ocean?: string;
+                /**
+                 * @description Statistics, separated by commas: `mean`, `sum`, `min`, `max`, `std`, `median`, `count`, `coverage`, and percentiles such
+                 *     as `p90`. With this, `step` or `min_coverage` the answer is a `StatisticsAnswer`.
+                 */
+                statistic?: string;
+                /** @description What a row of statistics covers; `native` unless told otherwise. */
+                step?: components["schemas"]["TimeStep"];
+                /** @description Least coverage, percent: rows of statistics with less have no values; 0 unless told otherwise. */
+                min_coverage?: number;
+                /** @description How cells on the coast count in statistics; `whole` unless told otherwise. */
+                cells?: components["schemas"]["Cells"];
+                /** @description Form of the answer: `json`, or its rows alone as `csv` or `arrow`, a file of Arrow; by the header `Accept` unless one is given. */
+                format?: components["schemas"]["RowsForm"];
+                /** @description Version, as answers name it; the newest unless one is given. */
+                manifest?: string;
+            };
+            header?: never;
+            path: {
+                /** @description Name of the product */
+                product: string;
+            };
+            cookie?: never;
+        };
+        /** @description The region in place of the parameter of that name, as GeoJSON of at most 64 MiB and a million vertices */
+        requestBody: {
+            content: {
+                "application/geo+json": components["schemas"]["GeoJson"];
+                "application/json": components["schemas"]["GeoJson"];
+            };
+        };
+        responses: {
+            /** @description One mean for each step; statistics where they are asked for */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": (components["schemas"]["Cited"] & {
+                        /** @description Figure of the earth for areas. */
+                        earth: components["schemas"]["Earth"];
+                        /** @description How the region was taken where that may surprise. */
+                        notes: string[];
+                        /**
+                         * Format: double
+                         * @description Area of the sea in it, m².
+                         */
+                        ocean_area_m2: number;
+                        /** @description What says which part of a cell is sea. */
+                        ocean_source: string;
+                        /** @description The region by its name, or as `west,south,east,north`. */
+                        region: string;
+                        /**
+                         * Format: double
+                         * @description Area of the region, land included, m².
+                         */
+                        region_area_m2: number;
+                        /** @description One mean for each step in the period, in the order of time. */
+                        series: components["schemas"]["RegionValue"][];
+                    }) | components["schemas"]["StatisticsAnswer"];
+                    "text/csv": string;
+                    "application/vnd.apache.arrow.file": unknown;
+                };
+            };
+            /** @description A parameter is not valid, or missing; the reason says what would be */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description Nothing of that name; the reason says where names are listed */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description The answer is still the one whose tag `If-None-Match` names */
+            412: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description The body is longer than 64 MiB */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description The body is not said to be GeoJSON, or is compressed */
+            415: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description A defect of this server */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description A store of others, to which the product is attached, does not hold what it held */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description Too much to do, or a part that is needed does not answer */
+            503: {
+                headers: {
+                    /** @description Seconds after which the same request may succeed */
+                    "retry-after"?: number;
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description The answer took too long */
+            504: {
+                headers: {
+                    /** @description Seconds after which the same request may succeed */
+                    "retry-after"?: number;
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+        };
+    };
     budget: {
         parameters: {
             query?: {
@@ -2875,6 +3194,170 @@ export interface operations {
             };
             /** @description Nothing of that name; the reason says where names are listed */
             404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description A defect of this server */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description A store of others, to which the product is attached, does not hold what it held */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description Too much to do, or a part that is needed does not answer */
+            503: {
+                headers: {
+                    /** @description Seconds after which the same request may succeed */
+                    "retry-after"?: number;
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description The answer took too long */
+            504: {
+                headers: {
+                    /** @description Seconds after which the same request may succeed */
+                    "retry-after"?: number;
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+        };
+    };
+    budget_of: {
+        parameters: {
+            query?: {
+                /**
+                 * @description `global` (the default), a name that `/api/regions` lists, `west,south,east,north` in degrees, GeoJSON or
+                 *     well-known text.
+                 */
+                region?: string;
+                /** @description First instant, ISO 8601 UTC; the product's own unless one is given. */
+                from?: string;
+                /** @description First instant after the period; the product's own unless one is given. */
+                to?: string;
+                /** @description What a row covers; `total` unless told otherwise. */
+                step?: components["schemas"]["TimeStep"];
+                /** @description Figure of the earth for areas; `wgs84` unless one is given. */
+                earth?: components["schemas"]["Earth"];
+                /** @description How cells on the coast count; `whole` unless told otherwise. */
+                cells?: components["schemas"]["Cells"];
+                /** @description Landed product whose cells say how much of them is sea or land, in place of Natural Earth. */
+                ocean?: string;
+                /** @description Version, as answers name it; the newest unless one is given. */
+                manifest?: string;
+                /**
+                 * @description The newest version that was published at an instant (ISO 8601 UTC; a day is its first moment), or one by its name. In place
+                 *     of `manifest`.
+                 */
+                as_of?: string;
+                /**
+                 * @description Standard error of the flux: `20%`, a number with its unit such as `0.3 mol m-2 year-1`, or a product of standard errors on
+                 *     the same grid. With it rows say how uncertain they are.
+                 */
+                error?: string;
+                /** @description How far errors of cells go together, km: exp(-d / length). 0 where the error of each cell is its own. */
+                correlation_length_km?: number;
+                /** @description How long errors of steps go together, days: exp(-t / days). 0, the error of each step is its own, unless given. */
+                correlation_days?: number;
+                /** @description Draws of a Monte Carlo, 10 to 10000: a check, and an interval that holds 95 % of the budgets. */
+                monte_carlo?: number;
+                /** @description The same seed draws the same errors; 0 unless given. */
+                seed?: number;
+                /**
+                 * @description Outgassing of river carbon that is taken off, Tg of carbon a year out of the sea, with its standard error if there is one
+                 *     (`650` or `650±300`), or a product that is summed over the same region.
+                 */
+                river_flux?: string;
+                /** @description Where the number is from; needed with it. */
+                river_source?: string;
+                /**
+                 * @description Parts of the region that are asked for by themselves too, and held against the whole: a GeoJSON `FeatureCollection` whose
+                 *     features have names, or a product that is a mask, of which each code is a part.
+                 */
+                regions?: string;
+            };
+            header?: never;
+            path: {
+                /** @description Name of a carbon flux or of accumulated carbon */
+                product: string;
+            };
+            cookie?: never;
+        };
+        /** @description The region, or a `FeatureCollection` of parts with names, in place of the parameter of that name, as GeoJSON of at most 64 MiB and a million vertices */
+        requestBody: {
+            content: {
+                "application/geo+json": components["schemas"]["GeoJson"];
+                "application/json": components["schemas"]["GeoJson"];
+            };
+        };
+        responses: {
+            /** @description One row for each step of time */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["BudgetAnswer"];
+                };
+            };
+            /** @description A parameter is not valid, or missing; the reason says what would be */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description Nothing of that name; the reason says where names are listed */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description The answer is still the one whose tag `If-None-Match` names */
+            412: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description The body is longer than 64 MiB */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description The body is not said to be GeoJSON, or is compressed */
+            415: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -3072,11 +3555,16 @@ export interface operations {
                 lat?: number;
                 /** @description `global`, a name that `/api/regions` lists, `west,south,east,north` in degrees, GeoJSON or well-known text. */
                 region?: string;
+                /**
+                 * @description `LON,LAT;LON,LAT;...` in degrees, GeoJSON or well-known text, in place of a region: the mean along a line, each cell by the length
+                 *     in it.
+                 */
+                line?: string;
                 /** @description First instant, ISO 8601 UTC; the products' own unless one is given. */
                 from?: string;
                 /** @description First instant after the period; the products' own unless one is given. */
                 to?: string;
-                /** @description Figure of the earth for areas; `wgs84` unless one is given. */
+                /** @description Figure of the earth for areas and lengths; `wgs84` unless one is given. */
                 earth?: components["schemas"]["Earth"];
                 /** @description Version, as answers name it; the newest unless one is given. */
                 manifest?: string;
@@ -3161,6 +3649,139 @@ export interface operations {
             };
         };
     };
+    correlation_of: {
+        parameters: {
+            query: {
+                /** @description The second product. */
+                with: string;
+                /** @description Most steps that one is moved against the other, 0 (the default) to 400. */
+                max_lag?: number;
+                /** @description What they are compared in; `month` unless told otherwise. For `native` both need the same periods. */
+                step?: components["schemas"]["TimeStep"];
+                /** @description `true`: the mean of each calendar month is taken off both first. */
+                deseasonalise?: boolean;
+                /** @description First instant, ISO 8601 UTC; the products' own unless one is given. */
+                from?: string;
+                /** @description First instant after the period; the products' own unless one is given. */
+                to?: string;
+                /** @description Figure of the earth for areas and lengths; `wgs84` unless one is given. */
+                earth?: components["schemas"]["Earth"];
+                /** @description Version, as answers name it; the newest unless one is given. */
+                manifest?: string;
+                /** @description Version of the second product; the newest unless one is given. */
+                with_manifest?: string;
+            };
+            header?: never;
+            path: {
+                /** @description Name of the first product */
+                product: string;
+            };
+            cookie?: never;
+        };
+        /** @description The region, or the line, in place of the parameter of that name, as GeoJSON of at most 64 MiB and a million vertices */
+        requestBody: {
+            content: {
+                "application/geo+json": components["schemas"]["GeoJson"];
+                "application/json": components["schemas"]["GeoJson"];
+            };
+        };
+        responses: {
+            /** @description One row for each lag */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Correlation"];
+                };
+            };
+            /** @description A parameter is not valid, or missing; the reason says what would be */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description Nothing of that name; the reason says where names are listed */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description The answer is still the one whose tag `If-None-Match` names */
+            412: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description The body is longer than 64 MiB */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description The body is not said to be GeoJSON, or is compressed */
+            415: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description A defect of this server */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description A store of others, to which the product is attached, does not hold what it held */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description Too much to do, or a part that is needed does not answer */
+            503: {
+                headers: {
+                    /** @description Seconds after which the same request may succeed */
+                    "retry-after"?: number;
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description The answer took too long */
+            504: {
+                headers: {
+                    /** @description Seconds after which the same request may succeed */
+                    "retry-after"?: number;
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+        };
+    };
     difference: {
         parameters: {
             query?: {
@@ -3180,7 +3801,12 @@ export interface operations {
                 lat?: number;
                 /** @description `global`, a name that `/api/regions` lists, `west,south,east,north` in degrees, GeoJSON or well-known text. */
                 region?: string;
-                /** @description Figure of the earth for areas; `wgs84` unless one is given. */
+                /**
+                 * @description `LON,LAT;LON,LAT;...` in degrees, GeoJSON or well-known text, in place of a region: the mean along a line, each cell by the length
+                 *     in it.
+                 */
+                line?: string;
+                /** @description Figure of the earth for areas and lengths; `wgs84` unless one is given. */
                 earth?: components["schemas"]["Earth"];
             };
             header?: never;
@@ -3212,6 +3838,133 @@ export interface operations {
             };
             /** @description Nothing of that name; the reason says where names are listed */
             404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description A defect of this server */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description A store of others, to which the product is attached, does not hold what it held */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description Too much to do, or a part that is needed does not answer */
+            503: {
+                headers: {
+                    /** @description Seconds after which the same request may succeed */
+                    "retry-after"?: number;
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description The answer took too long */
+            504: {
+                headers: {
+                    /** @description Seconds after which the same request may succeed */
+                    "retry-after"?: number;
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+        };
+    };
+    difference_of: {
+        parameters: {
+            query?: {
+                /** @description Years, both part of it: `2001/2005`; all that are covered unless given. */
+                period?: string;
+                /** @description Version, as answers name it; the newest unless one is given. */
+                manifest?: string;
+                /** @description Product that is taken off; the same one unless given. */
+                minus?: string;
+                /** @description Its years; the same ones unless given. */
+                minus_period?: string;
+                /** @description Its version; the newest unless one is given. */
+                minus_manifest?: string;
+                /** @description Figure of the earth for areas and lengths; `wgs84` unless one is given. */
+                earth?: components["schemas"]["Earth"];
+            };
+            header?: never;
+            path: {
+                /** @description Name of the product */
+                product: string;
+            };
+            cookie?: never;
+        };
+        /** @description The region, or the line, in place of the parameter of that name, as GeoJSON of at most 64 MiB and a million vertices */
+        requestBody: {
+            content: {
+                "application/geo+json": components["schemas"]["GeoJson"];
+                "application/json": components["schemas"]["GeoJson"];
+            };
+        };
+        responses: {
+            /** @description Both means and their difference */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Difference"];
+                };
+            };
+            /** @description A parameter is not valid, or missing; the reason says what would be */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description Nothing of that name; the reason says where names are listed */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description The answer is still the one whose tag `If-None-Match` names */
+            412: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description The body is longer than 64 MiB */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description The body is not said to be GeoJSON, or is compressed */
+            415: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -3545,6 +4298,142 @@ export interface operations {
             };
             /** @description Nothing of that name; the reason says where names are listed */
             404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description A defect of this server */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description A store of others, to which the product is attached, does not hold what it held */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description Too much to do, or a part that is needed does not answer */
+            503: {
+                headers: {
+                    /** @description Seconds after which the same request may succeed */
+                    "retry-after"?: number;
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description The answer took too long */
+            504: {
+                headers: {
+                    /** @description Seconds after which the same request may succeed */
+                    "retry-after"?: number;
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+        };
+    };
+    line_of: {
+        parameters: {
+            query?: {
+                /**
+                 * @description Statistics, separated by commas: `mean`, `sum`, `min`, `max`, `std`, `median`, `count`, `coverage`, and percentiles such
+                 *     as `p90`; `mean` unless told otherwise.
+                 */
+                statistic?: string;
+                /** @description What a row covers; `native` unless told otherwise. */
+                step?: components["schemas"]["TimeStep"];
+                /** @description First instant, ISO 8601 UTC; the product's own unless one is given. */
+                from?: string;
+                /** @description First instant after the period; the product's own unless one is given. */
+                to?: string;
+                /** @description Least coverage, percent: rows with less have no values; 0 unless told otherwise. */
+                min_coverage?: number;
+                /** @description Figure of the earth for lengths; `wgs84` unless one is given. */
+                earth?: components["schemas"]["Earth"];
+                /** @description Form of the answer: `json`, or its rows alone as `csv` or `arrow`, a file of Arrow; by the header `Accept` unless one is given. */
+                format?: components["schemas"]["RowsForm"];
+                /** @description Version, as answers name it; the newest unless one is given. */
+                manifest?: string;
+            };
+            header?: never;
+            path: {
+                /** @description Name of the product */
+                product: string;
+            };
+            cookie?: never;
+        };
+        /** @description The line in place of the parameter of that name, as GeoJSON of at most 64 MiB and a million vertices */
+        requestBody: {
+            content: {
+                "application/geo+json": components["schemas"]["GeoJson"];
+                "application/json": components["schemas"]["GeoJson"];
+            };
+        };
+        responses: {
+            /** @description One row for each bin of time */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["StatisticsAnswer"];
+                    "text/csv": string;
+                    "application/vnd.apache.arrow.file": unknown;
+                };
+            };
+            /** @description A parameter is not valid, or missing; the reason says what would be */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description Nothing of that name; the reason says where names are listed */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description The answer is still the one whose tag `If-None-Match` names */
+            412: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description The body is longer than 64 MiB */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description The body is not said to be GeoJSON, or is compressed */
+            415: {
                 headers: {
                     [name: string]: unknown;
                 };
