@@ -1,5 +1,5 @@
 //! A version of a product in, its values along time out, from where they are read fastest: runs of its cube that are
-//! time-major, map-major chunks of it, and fields where the cube does not have the version or is behind.
+//! time-major, map-major chunks of it, and fields where a few cells are wanted, or where the cube does not have the version or is behind.
 //!
 //! Steps are the same where their periods and the digests of their values are, so that all three give the same bits, and a
 //! cube of another version serves wherever it holds the same steps.

@@ -3,7 +3,9 @@
 
 use std::sync::Arc;
 
+use contract::geometry::AskedGeometry;
 use contract::manifest::Manifest;
+use contract::region::AskedRegion;
 use contract::statistics::{Statistic, Statistics, StatisticsAnswer, StatisticsQuery};
 use contract::time::TimeStep;
 use datafusion::arrow::array::{ArrayRef, Float64Array, RecordBatch, StringArray, UInt32Array};

@@ -156,6 +156,7 @@ async fn a_million_vertices_are_asked_about_and_one_more_is_refused() {
 }
 
 #[tokio::test]
+#[expect(clippy::too_many_lines, reason = "a list of bodies and of reasons")]
 async fn what_is_no_geometry_is_refused_and_says_why() {
     let app = TestApp::new().await;
     let tree = format!(r#"{{"type":"Point","x":[{}0]}}"#, "[1],".repeat(100_000));
