@@ -139,7 +139,7 @@ fn what_does_not_belong_together_is_refused_with_what_to_write() {
     let other_year = input("sst", grid, &months(2000, 1..=12), same);
     let text = said(steps(&[monthly.clone(), other_year], (None, None)));
     assert!(text.contains("no period that all inputs have"), "{text}");
-    assert!(text.contains("marked climatology"), "{text}");
+    assert!(text.contains("in every year climatology"), "{text}");
     let part = input("salt", grid, &months(2000, 2..=12), Matching::MonthOfYear);
     assert!(said(steps(&[monthly.clone(), part], (None, None))).contains("no climatology"));
     let many = input("mask", grid, &months(2000, 1..=2), Matching::AnyTime);
