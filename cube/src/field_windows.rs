@@ -9,13 +9,16 @@ use contract::chunk::{CHUNK_COLS, CHUNK_ROWS, Window};
 use contract::grid::Grid;
 use contract::key::ObjectKey;
 use futures::stream::{self, StreamExt as _, TryStreamExt as _};
-use storage::{Store, fields};
+use storage::Store;
+use storage::fields::{self, FileWindows};
 use tokio::task::JoinSet;
 
 use crate::{CubeError, Layout};
 
 /// Fields that a task reads at a time.
 const FIELDS_OF_A_TASK: usize = 8;
+/// Fields that a thread reads before it asks whether it shall go on.
+const FIELDS_OF_A_THREAD: usize = 256;
 /// Fewer fields are not worth a task.
 const LEAST_OF_A_TASK: usize = 16;
 /// To open a file and find the place of a chunk costs as much as to decode so many chunks.
@@ -71,7 +74,7 @@ impl FieldWindows {
         all.len()
     }
 
-    /// Values of the windows in these fields, on all processors, in the order asked.
+    /// Values of the windows in these fields, on all processors; numbers are in increasing order, as asked.
     ///
     /// # Errors
     /// The first field that is gone or damaged.
@@ -116,6 +119,52 @@ impl FieldWindows {
     }
 
     async fn one_by_one(&self, fields: Vec<Asked>) -> Result<Vec<Found>, CubeError> {
+        let is_on_disk = |(field, _): &Asked| self.store.field_file(field).is_some();
+        if !fields.iter().any(is_on_disk) {
+            return self.by_requests(fields).await;
+        }
+        let mut found = vec![];
+        let mut left = fields.into_iter();
+        loop {
+            let some: Vec<Asked> = left.by_ref().take(FIELDS_OF_A_THREAD).collect();
+            if some.is_empty() {
+                return Ok(found);
+            }
+            found.extend(self.some(some).await?);
+        }
+    }
+
+    /// The same of as many as are read to the end once they are begun, whoever still waits for them.
+    async fn some(&self, fields: Vec<Asked>) -> Result<Vec<Found>, CubeError> {
+        let own = self.clone();
+        let of_files = tokio::task::spawn_blocking(move || own.of_files(fields));
+        let (mut found, others) = of_files
+            .await
+            .map_err(|e| CubeError::library("a thread", "reading fields", &e))?;
+        if !others.is_empty() {
+            found.extend(self.by_requests(others).await?);
+            found.sort_unstable_by_key(|(number, _)| *number);
+        }
+        Ok(found)
+    }
+
+    /// Those that are files of this machine, and the others.
+    fn of_files(&self, fields: Vec<Asked>) -> (Vec<Found>, Vec<Asked>) {
+        let Some(windows) = FileWindows::new(&self.grid, &self.windows) else {
+            return (vec![], fields);
+        };
+        let (mut found, mut others) = (vec![], vec![]);
+        for (field, number) in fields {
+            let file = self.store.field_file(&field);
+            match file.and_then(|file| windows.read(&file, &field)) {
+                Some(values) => found.push((number, values)),
+                None => others.push((field, number)),
+            }
+        }
+        (found, others)
+    }
+
+    async fn by_requests(&self, fields: Vec<Asked>) -> Result<Vec<Found>, CubeError> {
         let read = |(field, number): Asked| async move {
             let reader = fields::Reader::open(&self.store, &field, Some(&self.grid)).await?;
             let values = reader.windows(&self.windows).await?;

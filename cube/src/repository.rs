@@ -10,7 +10,8 @@ use icechunk::config::{
 };
 use icechunk::format::SnapshotId;
 use icechunk::format::format_constants::SpecVersionBin;
-use icechunk::repository::{RepositoryErrorKind, VersionInfo};
+use icechunk::refs::RefErrorKind;
+use icechunk::repository::{RepositoryError, RepositoryErrorKind, VersionInfo};
 use storage::Store;
 use tokio::sync::RwLock;
 use zarrs_icechunk::AsyncIcechunkStore;
@@ -185,11 +186,10 @@ impl Repository {
                 (Err(error), At::Newest) => {
                     return Err(self.failed("reading the newest state", &error));
                 }
-                (Err(error), At::Version(version)) => {
-                    let there = self.versions().await?;
-                    if there.contains(version) {
-                        return Err(self.failed("reading a version", &error));
-                    }
+                // By the error alone: a list of versions that is read now may have one that was named meanwhile.
+                (Err(error), At::Version(version)) if is_no_tag(&error) => {
+                    let mut there = self.versions().await?;
+                    there.retain(|it| it != version);
                     return Err(CubeError::NoVersion {
                         place: self.place.clone(),
                         version: version.clone(),
@@ -199,6 +199,9 @@ impl Repository {
                             there.join(", ")
                         },
                     });
+                }
+                (Err(error), At::Version(_)) => {
+                    return Err(self.failed("reading a version", &error));
                 }
             };
             Cube::open(session, &self.objects).await
@@ -258,6 +261,14 @@ impl Repository {
     pub(crate) fn failed(&self, doing: &'static str, error: &dyn std::fmt::Display) -> CubeError {
         CubeError::library(&self.place, doing, error)
     }
+}
+
+/// Does it say that there is no such tag?
+fn is_no_tag(error: &RepositoryError) -> bool {
+    matches!(
+        error.kind,
+        RepositoryErrorKind::Ref(RefErrorKind::RefNotFound(_))
+    )
 }
 
 /// The same for this process, which reads nothing ahead: opening a state has Icechunk read the manifests of all coordinates beside

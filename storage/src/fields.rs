@@ -3,6 +3,8 @@
 //! A field is named by the digest of its values: other bytes for the same values are the same field. Fields stored
 //! before that was so are named by the digest of their bytes and have no check in their rows; they are read as they are.
 
+mod cut;
+mod files;
 mod names;
 mod reader;
 mod spooled;
@@ -31,6 +33,7 @@ use crate::sound::{self, damage};
 use crate::values::ValuesDigest;
 use crate::{Encoded, StorageError, Store};
 
+pub use files::FileWindows;
 pub use names::settle;
 pub use reader::{Bands, Reader};
 pub use spooled::Spooled;

@@ -25,7 +25,7 @@ use crate::row_check::RowCheck;
 use crate::sound::damage;
 
 /// What is read of a file's end at first: the footer and the index of pages of a field of a hundred chunks.
-const TAIL_BYTES: usize = 16 << 10;
+pub(crate) const TAIL_BYTES: usize = 16 << 10;
 
 /// A stored object, and where queries read it.
 #[derive(Debug, Clone)]
@@ -68,13 +68,17 @@ impl RowIndex {
         }
         let head = stored.objects.head(&stored.path).await;
         let size_bytes = head.map_err(|e| crate::store::failed(&stored.key, e))?.size;
-        let footer = ParquetMetaDataReader::new()
-            .with_column_index_policy(PageIndexPolicy::Skip)
-            .with_offset_index_policy(PageIndexPolicy::Optional)
-            .with_prefetch_hint(Some(TAIL_BYTES));
+        let footer = footer().with_prefetch_hint(Some(TAIL_BYTES));
         let meta = footer.load_and_finish(Footer(stored), size_bytes).await;
         let meta = meta.map_err(|e| unreadable(&stored.key, e))?;
         Ok(Self::of(meta))
+    }
+
+    /// The same of the last bytes of a file; none too if these are too few.
+    pub(crate) fn of_end(tail: &Bytes, size_bytes: u64) -> Option<Self> {
+        let mut footer = footer();
+        footer.try_parse_sized(tail, size_bytes).ok()?;
+        Self::of(footer.finish().ok()?)
     }
 
     fn of(meta: ParquetMetaData) -> Option<Self> {
@@ -121,7 +125,7 @@ impl RowIndex {
     }
 
     /// Bytes of the file that hold some rows, in increasing order.
-    fn ranges(&self, rows: &[u32]) -> Option<Vec<Range<u64>>> {
+    pub(crate) fn ranges(&self, rows: &[u32]) -> Option<Vec<Range<u64>>> {
         let mut parts = Vec::with_capacity(rows.len() + 1);
         let mut last_group = None;
         for &row in rows {
@@ -152,6 +156,13 @@ impl RowIndex {
         let start = u64::try_from(page.offset).ok()?;
         Some(start..start + u64::try_from(page.compressed_page_size).ok()?)
     }
+}
+
+/// Reads the end of a file: where its pages are, and nothing of what they hold.
+fn footer() -> ParquetMetaDataReader {
+    ParquetMetaDataReader::new()
+        .with_column_index_policy(PageIndexPolicy::Skip)
+        .with_offset_index_policy(PageIndexPolicy::Optional)
 }
 
 /// Reads parts of a file for the Parquet library.
@@ -216,6 +227,21 @@ pub async fn fetch(
 }
 
 impl Fetched {
+    /// Bytes that somebody else fetched: those that the index says hold the rows, which are in increasing order.
+    pub(crate) fn of_parts(
+        key: &ObjectKey,
+        index: Arc<RowIndex>,
+        rows: Vec<u32>,
+        parts: Vec<(Range<u64>, Bytes)>,
+    ) -> Self {
+        let size_bytes = parts.last().map_or(0, |(range, _)| range.end);
+        Self {
+            key: key.clone(),
+            rows,
+            content: Content::Parts(index, page::Parts::new(parts, size_bytes)),
+        }
+    }
+
     /// Hands each row and its values to `take`, in increasing order; it works long and belongs on a thread of its own.
     ///
     /// # Errors

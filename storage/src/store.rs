@@ -239,8 +239,13 @@ impl Store {
     /// The file that holds an object of a folder: a thread of its own that reads many small parts of many objects takes a tenth of what
     /// a request each takes. None of another store, where a layer is to see requests, and of fields that may lie elsewhere.
     pub fn file(&self, key: &ObjectKey) -> Option<PathBuf> {
+        let is_elsewhere = self.bare.is_some() && Kind::of(key) == Some(Kind::Field);
+        (!is_elsewhere).then(|| self.field_file(key)).flatten()
+    }
+
+    /// The same of a field, which lies there if it is not one of an attached product's: then the store is to be asked.
+    pub fn field_file(&self, key: &ObjectKey) -> Option<PathBuf> {
         match &self.place {
-            Place::Folder(_) if self.bare.is_some() && Kind::of(key) == Some(Kind::Field) => None,
             Place::Folder(root) if !self.is_layered => Some(root.join(key.as_str())),
             Place::Folder(_) | Place::Memory | Place::Cloud | Place::Hdfs => None,
         }

@@ -290,7 +290,7 @@ fn killed_processes_lose_nothing_double_nothing_and_nobody_is_told_anything_wron
     until_landed(&cluster, "nobody", &sender, &truth);
     until_read(&cluster);
     until_derived(&cluster);
-    assert_answered(load);
+    assert_answered(load, &cluster);
     assert_as_undisturbed(&cluster, &sender);
     each_file_told_once(&cluster, &sender);
     for (kind, mut seconds) in recovery {
@@ -305,9 +305,14 @@ fn killed_processes_lose_nothing_double_nothing_and_nobody_is_told_anything_wron
 }
 
 /// No answer was wrong, and few were missing.
-fn assert_answered(load: Load) {
+fn assert_answered(load: Load, cluster: &Cluster) {
     for tally in load.end() {
-        assert!(tally.wrong.is_empty(), "{:?}", tally.wrong);
+        assert!(
+            tally.wrong.is_empty(),
+            "{:?}\n{}",
+            tally.wrong,
+            refusals(cluster)
+        );
         assert!(
             tally.right > 0,
             "nothing was answered: the load asked nothing"
@@ -320,6 +325,17 @@ fn assert_answered(load: Load) {
         );
         assert!(tally.longest_gap <= LONGEST_GAP, "{:?}", tally.longest_gap);
     }
+}
+
+/// What tile servers said of requests that failed: their folders go with the cluster.
+fn refusals(cluster: &Cluster) -> String {
+    let servers = cluster.nodes.values();
+    let servers = servers.filter(|node| node.name.starts_with("tile-server"));
+    let said = servers.map(|node| node.said()).collect::<String>();
+    let failed = said
+        .lines()
+        .filter(|line| line.contains("a request failed"));
+    failed.collect::<Vec<_>>().join("\n")
 }
 
 /// Budgets and tiles of the end have the bytes of a run in which each month landed once, in its newest edition.

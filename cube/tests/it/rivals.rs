@@ -1,5 +1,7 @@
 //! Two writers of one cube: both are in it afterwards, and neither sends its values twice.
 
+use std::time::Duration;
+
 use contract::quantity::Quantity;
 use cube::{At, CubeError, Edit, Repository};
 use storage::Store;
@@ -105,4 +107,37 @@ async fn a_rival_that_took_a_part_of_the_period_is_an_error_and_changes_nothing(
     );
     let cube = repository.at(&At::Newest).await.unwrap();
     assert_eq!(cube.steps().len(), 1);
+}
+
+/// Somebody asks for a version in the very moment in which it is named: it is there, or it is not.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_version_that_is_named_just_then_is_there_or_is_not() {
+    const VERSIONS: u32 = 100;
+    let store = Store::memory();
+    let description = description(Quantity::CarbonFlux, grid(20, 30));
+    let grid = description.grid;
+    let repository = Repository::create(&store, "p", &description).await.unwrap();
+    let mut edit = Edit::begin(&repository).await.unwrap();
+    edit.put(month(1), values(&grid, 1)).await.unwrap();
+    let snapshot = edit.commit("a step").await.unwrap().snapshot.unwrap();
+    let asking = tokio::spawn(async move {
+        let mut too_early = 0;
+        for version in 1..=VERSIONS {
+            let version = At::Version(version.to_string());
+            loop {
+                match repository.at(&version).await {
+                    Ok(cube) => break assert_eq!(cube.steps().len(), 1),
+                    Err(CubeError::NoVersion { .. }) => too_early += 1,
+                    Err(error) => panic!("{error}"),
+                }
+            }
+        }
+        too_early
+    });
+    let naming = Repository::open(&store, "p").await.unwrap();
+    for version in 1..=VERSIONS {
+        tokio::time::sleep(Duration::from_millis(2)).await;
+        naming.tag(&version.to_string(), &snapshot).await.unwrap();
+    }
+    assert!(asking.await.unwrap() > VERSIONS, "nobody asked too early");
 }

@@ -3,11 +3,10 @@
 //! Every chunk is compared with its own check. The name of a field vouches for all of its values: who reads all bands
 //! ([`Reader::bands`]) learns at the end whether they are those.
 
-use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
 
-use contract::chunk::{BAND_CELLS, CHUNK_COLS, CHUNK_ROWS, Window, bands, field_chunks};
+use contract::chunk::{BAND_CELLS, Window, bands, field_chunks};
 use contract::digest::Digest;
 use contract::grid::Grid;
 use contract::key::ObjectKey;
@@ -17,7 +16,8 @@ use object_store::path::Path;
 use parquet::file::metadata::ParquetMetaData;
 use parquet::file::statistics::Statistics;
 
-use super::{check_count, decode, digest_begun, expected};
+use super::cut::Cut;
+use super::{check_count, decode, digest_begun};
 use crate::off_thread::off_thread;
 use crate::parquet_table::{shape_of, shape_only};
 use crate::rows::{self, RowIndex, Stored};
@@ -180,31 +180,12 @@ impl Reader {
             }
             Source::Rows { index, chunks, .. } => (Arc::clone(index), Arc::clone(chunks)),
         };
-        let mut touched: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
-        for (number, window) in windows.iter().enumerate() {
-            for chunk in chunks_of(&self.grid, *window) {
-                touched.entry(chunk).or_default().push(number);
-            }
-        }
-        let wanted: Vec<u32> = touched.keys().copied().collect();
+        let cut = Cut::new(&self.grid, windows);
+        let wanted = cut.chunks();
         let is_quick = wanted.len() <= CHUNKS_AT_HAND;
         let fetched = rows::fetch(&self.stored, Some(index), wanted).await?;
-        let (period, windows) = (self.period, windows.to_vec());
-        let picked = move || {
-            let blank = |window: &Window| vec![f32::NAN; window.cell_count()];
-            let mut values: Vec<Vec<f32>> = windows.iter().map(blank).collect();
-            fetched.each(
-                |chunk| expected(&chunks, chunk, period),
-                |chunk, found| {
-                    for number in &touched[&chunk] {
-                        let own = &mut values[*number];
-                        copy(chunks[chunk as usize], found, windows[*number], own);
-                    }
-                    Ok::<_, StorageError>(())
-                },
-            )?;
-            Ok(values)
-        };
+        let period = self.period;
+        let picked = move || cut.of(&fetched, &chunks, period);
         if is_quick {
             return picked();
         }
@@ -293,7 +274,7 @@ fn stored(store: &Store, key: &ObjectKey) -> Stored {
 
 /// What the end of a file says of its grid and its period; none if it does not say both. The period is compared with the check
 /// of every chunk.
-fn of_file(metadata: &ParquetMetaData) -> Option<(Grid, Period)> {
+pub(super) fn of_file(metadata: &ParquetMetaData) -> Option<(Grid, Period)> {
     let [rows, cols] = shape_of(metadata).ok()?[..] else {
         return None;
     };
@@ -309,30 +290,6 @@ fn of_file(metadata: &ParquetMetaData) -> Option<(Grid, Period)> {
     let [start, end] = PERIOD.map(time);
     let period = Period::new(start?, end?).ok()?;
     Some((shape_only(rows, cols), period))
-}
-
-/// Numbers of the chunks that a window lies in.
-fn chunks_of(grid: &Grid, window: Window) -> Vec<u32> {
-    let touched = |first: u32, count: u32, side: u32| first / side..(first + count).div_ceil(side);
-    let across = grid.cols.div_ceil(CHUNK_COLS);
-    let cols = touched(window.col, window.cols, CHUNK_COLS);
-    let rows = touched(window.row, window.rows, CHUNK_ROWS);
-    rows.flat_map(|row| cols.clone().map(move |col| row * across + col))
-        .collect()
-}
-
-/// Copies what a chunk holds of a window.
-fn copy(chunk: Window, found: &[f32], window: Window, values: &mut [f32]) {
-    let shared =
-        |a: u32, a_count: u32, b: u32, b_count: u32| a.max(b)..(a + a_count).min(b + b_count);
-    let cols = shared(chunk.col, chunk.cols, window.col, window.cols);
-    let at = |own: Window, row: u32| {
-        let start = (row - own.row) as usize * own.cols as usize + (cols.start - own.col) as usize;
-        start..start + cols.len()
-    };
-    for row in shared(chunk.row, chunk.rows, window.row, window.rows) {
-        values[at(window, row)].copy_from_slice(&found[at(chunk, row)]);
-    }
 }
 
 #[cfg(test)]
