@@ -9,21 +9,18 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
 
-use bytes::Bytes;
-use futures::stream::{self, StreamExt as _, TryStreamExt as _};
 use glam::{Mat4, Vec4};
-use icechunk::format::manifest::ChunkPayload;
-use icechunk::format::{ChunkIndices, Path};
+use icechunk::format::Path;
 use quick_cache::Weighter;
 use quick_cache::sync::Cache;
 use zarrs::array::{Array, ElementOwned};
-use zarrs::storage::AsyncReadableStorageTraits as _;
 use zarrs::storage::byte_range::ByteRange;
 use zarrs_icechunk::AsyncIcechunkStore;
 
 use crate::error::first_lines;
 use crate::layout::{BLOCK_CELLS, RUN_STEPS};
 use crate::object_storage::ObjectStorage;
+use crate::shards::{Shard, Shards};
 use crate::stored_chunks::{InPart, Part, Source, StoredChunks, TOO_SHORT};
 use crate::unreadable::Object;
 use crate::{CubeError, Description, Layout, arrays};
@@ -36,9 +33,6 @@ const ENTRY_BYTES: usize = 16;
 const CRC_BYTES: usize = 4;
 /// Blocks of a shard that so few bytes lie between are read together: that is quicker than to read another part.
 const GAP_BYTES: u64 = 8 << 10;
-/// Parts of a shard that is no object of its own, which are read at a time.
-const READS_AT_ONCE: usize = 8;
-const NO_SHARD: &str = "its shard is not there";
 /// Values of a block in a run.
 const BLOCK_VALUES: usize = (BLOCK_CELLS * BLOCK_CELLS) as usize * RUN_STEPS;
 
@@ -135,6 +129,14 @@ impl Blocks {
         arrays::name(&self.array)
     }
 
+    fn shards(&self) -> Shards<'_> {
+        Shards {
+            array: &self.array,
+            path: &self.path,
+            objects: &self.objects,
+        }
+    }
+
     fn object(&self, shard: [u64; 3]) -> Object<'_> {
         Object {
             array: &self.array,
@@ -180,10 +182,13 @@ impl Blocks {
         let mut places: Vec<Place> = numbers.iter().map(place).collect();
         places.retain(|(_offset, length, _number)| *length > 0);
         places.sort_unstable();
-        let is_near = |a: &Place, b: &Place| b.0 <= a.0 + a.1 + GAP_BYTES;
+        let shard = self.shards().at(key).await?;
+        // What questions share are blocks: each is a part of its own.
+        let is_shared = matches!(shard, Shard::Object(..));
+        let is_near = |a: &Place, b: &Place| !is_shared && b.0 <= a.0 + a.1 + GAP_BYTES;
         let near: Vec<&[Place]> = places.chunk_by(is_near).collect();
         let ranges: Vec<Range<u64>> = near.iter().map(|near| range_of(near)).collect();
-        let sources = self.sources(key, &ranges).await?;
+        let sources = self.shards().sources(key, shard, &ranges).await?;
         let part = |((near, range), source): ((&&[Place], &Range<u64>), Source)| {
             let chunk = |(offset, length, number): &Place| {
                 let start = (offset - range.start) as usize;
@@ -196,35 +201,6 @@ impl Blocks {
             Ok(Part { source, chunks })
         };
         near.iter().zip(&ranges).zip(sources).map(part).collect()
-    }
-
-    /// Where parts of a shard are read, in the order of their ranges. They are asked for at once where the store can: a region has many.
-    async fn sources(&self, shard: [u64; 3], ranges: &[Range<u64>]) -> Result<Vec<Source>, String> {
-        let index = ChunkIndices(shard.iter().map(|at| *at as u32).collect());
-        let session = self.array.storage().session();
-        let payload = session.read().await.get_chunk_ref(&self.path, &index).await;
-        if let Some(ChunkPayload::Ref(chunk)) = payload.map_err(|e| first_lines(&e))? {
-            let end = chunk.offset.saturating_add(chunk.length);
-            let moved = |range: &Range<u64>| {
-                let at = |place: u64| chunk.offset.saturating_add(place).min(end);
-                at(range.start)..at(range.end)
-            };
-            let ranges = ranges.iter().map(moved);
-            let name = chunk.id.to_string();
-            if let Some(file) = self.objects.file(&name) {
-                return Ok(ranges.map(|own| Source::File(file.clone(), own)).collect());
-            }
-            let ranges: Vec<Range<u64>> = ranges.collect();
-            let parts = self.objects.parts(&name, &ranges).await?;
-            return Ok(parts.into_iter().map(Source::Held).collect());
-        }
-        let read = |range: Range<u64>| async move {
-            let range = ByteRange::FromStart(range.start, Some(range.end - range.start));
-            let content = self.part(shard, range).await?.ok_or(NO_SHARD)?;
-            Ok::<_, String>(Source::Held(Bytes::from(content)))
-        };
-        let reads = stream::iter(ranges.iter().cloned()).map(read);
-        reads.buffered(READS_AT_ONCE).try_collect().await
     }
 
     /// Where a block lies in its shard: first byte, and how many, none without data.
@@ -261,20 +237,13 @@ impl Blocks {
         }
     }
 
-    async fn part(&self, shard: [u64; 3], range: ByteRange) -> Result<Option<Vec<u8>>, String> {
-        let key = self.array.chunk_key(&shard);
-        let found = self.array.storage().get_partial(&key, range).await;
-        let found = found.map_err(|e| first_lines(&e))?;
-        Ok(found.map(Vec::from))
-    }
-
     async fn index(&self, shard: [u64; 3]) -> Result<Arc<Index>, String> {
         if let Some(index) = self.indexes.get(&shard) {
             return Ok(index);
         }
         let entries = (self.shard[0] * self.shard[1]) as usize;
         let bytes = (entries * ENTRY_BYTES + CRC_BYTES) as u64;
-        let index = match self.part(shard, ByteRange::Suffix(bytes)).await? {
+        let index = match self.shards().part(shard, ByteRange::Suffix(bytes)).await? {
             Some(content) => parse(&content, entries)?,
             // No cell of it has data in any step.
             None => vec![],

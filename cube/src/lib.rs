@@ -43,6 +43,7 @@ mod repository;
 mod rounding;
 pub mod scale;
 mod series;
+mod shards;
 mod staged;
 mod state;
 mod stored_chunks;

@@ -68,14 +68,14 @@ impl ObjectStorage {
         self.store.file(&key)
     }
 
-    /// Parts of a chunk that the repository names so, in the order of their ranges.
+    /// Parts of a chunk that the repository names so, in the order of their ranges; questions share them.
     pub(crate) async fn parts(
         &self,
         chunk: &str,
         ranges: &[Range<u64>],
     ) -> Result<Vec<Bytes>, String> {
         let path = Path::from(self.path(&format!("chunks/{chunk}")));
-        let found = self.store.object_store().get_ranges(&path, ranges).await;
+        let found = self.store.shared_parts(&path, ranges).await;
         found.map_err(|e| e.to_string())
     }
 

@@ -21,6 +21,7 @@ mod newest;
 mod read;
 mod retry_store;
 mod settings;
+mod shared_parts;
 mod swap;
 mod traffic;
 
@@ -41,6 +42,7 @@ use self::checked::Checked;
 use self::held_pages::HeldPages;
 use self::location::Location;
 use self::newest::Newest;
+use self::shared_parts::SharedParts;
 use crate::StorageError;
 
 pub use self::leftovers::Leftover;
@@ -77,6 +79,8 @@ pub struct Store {
     is_layered: bool,
     /// Pages of manifests that were read.
     pub(crate) pages: Arc<HeldPages>,
+    /// Parts of objects that never change.
+    parts: Arc<SharedParts>,
     /// The newest numbers of manifests that were seen.
     pub(crate) newest: Arc<Newest>,
     /// The same store without the fields of attached products, if it has them.
@@ -153,6 +157,7 @@ impl Store {
             traffic: None,
             is_layered: false,
             pages: Arc::default(),
+            parts: Arc::default(),
             newest: Arc::default(),
             bare: None,
         }
@@ -177,6 +182,7 @@ impl Store {
             traffic: None,
             is_layered: false,
             pages: Arc::default(),
+            parts: Arc::default(),
             newest: Arc::default(),
             bare: None,
         })
@@ -201,6 +207,7 @@ impl Store {
             traffic: None,
             is_layered: false,
             pages: Arc::default(),
+            parts: Arc::default(),
             newest: Arc::default(),
             bare: None,
         })

@@ -107,6 +107,7 @@ impl Store {
             is_layered: true,
             checked: Arc::default(),
             pages: Arc::default(),
+            parts: Arc::default(),
             newest: Arc::default(),
             ..self.clone()
         };
