@@ -55,6 +55,9 @@ impl AggregateUDFImpl for MergeAccumulated {
 #[derive(Debug, Default)]
 struct Merged {
     all: Accumulated,
+    /// The only part so far, as it came: where there is no other it goes on like that.
+    only: Option<Vec<u8>>,
+    has_some: bool,
     /// A part is missing.
     is_in_part: bool,
     /// Bytes of what was merged last, a measure of what is held.
@@ -63,18 +66,32 @@ struct Merged {
 
 impl Merged {
     fn bytes(&self) -> ScalarValue {
-        ScalarValue::Binary((!self.is_in_part).then(|| self.all.to_bytes()))
+        let bytes = || match &self.only {
+            Some(only) => only.clone(),
+            None => self.all.to_bytes(),
+        };
+        ScalarValue::Binary((!self.is_in_part).then(bytes))
+    }
+
+    fn add(&mut self, part: &[u8]) -> Result<()> {
+        let external = |e: crate::ComputeError| DataFusionError::External(e.into());
+        if !self.has_some {
+            (self.has_some, self.only) = (true, Some(part.to_vec()));
+            return Ok(());
+        }
+        if let Some(first) = self.only.take() {
+            self.all.merge_bytes(&first).map_err(external)?;
+        }
+        self.all.merge_bytes(part).map_err(external)
     }
 }
 
 impl Accumulator for Merged {
     fn update_batch(&mut self, arguments: &[ArrayRef]) -> Result<()> {
-        let external = |e: crate::ComputeError| DataFusionError::External(e.into());
         let parts = arguments[0].as_binary::<i32>();
         self.is_in_part |= parts.null_count() > 0;
         for part in parts.iter().flatten() {
-            let part = Accumulated::of_bytes(part).map_err(external)?;
-            self.all.merge(part).map_err(external)?;
+            self.add(part)?;
         }
         self.size_bytes = self.size_bytes.max(arguments[0].get_array_memory_size());
         Ok(())

@@ -119,30 +119,45 @@ impl Accumulated {
     /// # Errors
     /// These are no such bytes.
     pub(crate) fn of_bytes(bytes: &[u8]) -> Result<Self, ComputeError> {
-        let read = |reader: &mut Reader<'_>| -> Option<Self> {
-            let mut all = Self::default();
-            for _ in 0..reader.u32()? {
-                let step = reader.u32()?;
-                let sums = StepSums {
-                    count: reader.u64()?,
-                    weight: reader.i128()?,
-                    covered: reader.i128()?,
-                    sum: reader.i128()?,
-                    squares: reader.i128()?,
-                    min: f32::from_bits(reader.u32()?),
-                    max: f32::from_bits(reader.u32()?),
-                };
-                all.steps.insert(step, sums);
-            }
-            all.histograms = Histograms::read(reader)?;
-            for _ in 0..reader.u32()? {
-                let step = reader.u32()?;
-                all.regions.insert(step, RegionStepSums::read(reader)?);
-            }
-            reader.is_empty().then_some(all)
-        };
-        read(&mut Reader::new(bytes))
-            .ok_or_else(|| ComputeError::inconsistent("accumulated sums", "they are cut off"))
+        let mut all = Self::default();
+        all.merge_bytes(bytes)?;
+        Ok(all)
+    }
+
+    /// Adds what others have accumulated, as it passes from process to process.
+    ///
+    /// # Errors
+    /// These are no such bytes, or a sum leaves 128 bits; what was there is lost.
+    pub(crate) fn merge_bytes(&mut self, bytes: &[u8]) -> Result<(), ComputeError> {
+        self.merge_from(&mut Reader::new(bytes)).ok_or_else(|| {
+            ComputeError::inconsistent(
+                "accumulated sums",
+                "they are cut off, or a sum exceeds 128 bits: ask for a shorter period",
+            )
+        })
+    }
+
+    fn merge_from(&mut self, reader: &mut Reader<'_>) -> Option<()> {
+        for _ in 0..reader.u32()? {
+            let step = reader.u32()?;
+            let sums = StepSums {
+                count: reader.u64()?,
+                weight: reader.i128()?,
+                covered: reader.i128()?,
+                sum: reader.i128()?,
+                squares: reader.i128()?,
+                min: f32::from_bits(reader.u32()?),
+                max: f32::from_bits(reader.u32()?),
+            };
+            self.steps.entry(step).or_default().merge(&sums)?;
+        }
+        self.histograms.merge_written(reader)?;
+        for _ in 0..reader.u32()? {
+            let step = reader.u32()?;
+            let sums = RegionStepSums::read(reader)?;
+            self.regions.entry(step).or_default().merge(&sums)?;
+        }
+        reader.is_empty().then_some(())
     }
 }
 
@@ -199,6 +214,11 @@ mod tests {
         all.merge(some(9, 1 << 60)).unwrap();
         let bytes = all.to_bytes();
         assert_eq!(Accumulated::of_bytes(&bytes).unwrap(), all);
+        let mut other = some(4, 3);
+        other.merge_bytes(&bytes).unwrap();
+        let mut merged = some(4, 3);
+        merged.merge(all.clone()).unwrap();
+        assert_eq!(other, merged);
         assert!(Accumulated::of_bytes(&bytes[..bytes.len() - 1]).is_err());
         assert!(Accumulated::of_bytes(&[&bytes[..], &[0]].concat()).is_err());
     }

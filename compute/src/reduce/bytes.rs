@@ -32,6 +32,21 @@ impl<'a> Reader<'a> {
 
     /// A number as [`put_short`] writes it; none if it is cut off, or of more bits.
     pub(super) fn short(&mut self) -> Option<u128> {
+        // Nearly all have few bits.
+        let mut low = 0;
+        for at in 0..LOW_BYTES {
+            let byte = *self.0.get(at as usize)?;
+            low |= u64::from(byte & LOW) << (BITS * at);
+            if byte & MORE == 0 {
+                self.0 = &self.0[at as usize + 1..];
+                return Some(low.into());
+            }
+        }
+        self.long()
+    }
+
+    /// The same of a number of any bits.
+    fn long(&mut self) -> Option<u128> {
         let mut number = 0;
         for at in 0..SHORT_BYTES {
             let [byte] = self.take()?;
@@ -55,6 +70,9 @@ const MORE: u8 = 0x80;
 /// Bytes of a number of 128 bits.
 const SHORT_BYTES: u32 = u128::BITS.div_ceil(BITS);
 
+/// Bytes of a number that 64 bits hold, whatever it is.
+const LOW_BYTES: u32 = u64::BITS / BITS;
+
 /// Writes a number in as few bytes as its bits need (LEB128).
 pub(super) fn put_short(out: &mut Vec<u8>, mut number: u128) {
     loop {
@@ -74,7 +92,17 @@ mod tests {
 
     #[test]
     fn short_numbers_are_read_as_they_are_written() {
-        for number in [0, 1, 127, 128, 1 << 62, u128::MAX >> 1, u128::MAX] {
+        for number in [
+            0,
+            1,
+            127,
+            128,
+            1 << 62,
+            (1 << 63) - 1,
+            1 << 63,
+            u128::MAX >> 1,
+            u128::MAX,
+        ] {
             let mut out = vec![];
             put_short(&mut out, number);
             let bits = u128::BITS - number.leading_zeros();

@@ -119,24 +119,30 @@ impl Histograms {
         }
     }
 
-    /// The same back; none if it is cut off.
-    pub(super) fn read(from: &mut Reader<'_>) -> Option<Self> {
+    /// Adds others of the same ranges, as they were written: of a range no more is touched than holds weight. None if they are cut off, have
+    /// other buckets, or if a sum leaves 128 bits.
+    pub(super) fn merge_written(&mut self, from: &mut Reader<'_>) -> Option<()> {
         /// Most buckets of a range: see `percentiles`.
         const MAX_BUCKETS: u128 = 1 << 16;
-        let mut all = Self::default();
-        for _ in 0..from.short()? {
-            let count = from.short().filter(|count| *count <= MAX_BUCKETS)?;
-            let mut weights = vec![0; count as usize];
+        for range in 0..from.short()? {
+            let count = from.short().filter(|count| *count <= MAX_BUCKETS)? as usize;
+            let weighty = from.short()?;
+            let own = self.own(usize::try_from(range).ok()?);
+            if own.is_empty() {
+                *own = vec![0; count];
+            } else if count > 0 && own.len() != count {
+                return None;
+            }
             let mut next: usize = 0;
-            for _ in 0..from.short()? {
+            for _ in 0..weighty {
                 let before = from.short().filter(|before| *before < MAX_BUCKETS)?;
                 let bucket = next + before as usize;
-                *weights.get_mut(bucket)? = unzigzag(from.short()?);
+                let weight = own.get_mut(bucket)?;
+                *weight = weight.checked_add(unzigzag(from.short()?))?;
                 next = bucket + 1;
             }
-            all.weights.push(weights);
         }
-        Some(all)
+        Some(())
     }
 }
 
@@ -198,7 +204,24 @@ mod tests {
         }
         let mut out = vec![];
         all.write(&mut out);
-        assert_eq!(Histograms::read(&mut Reader::new(&out)), Some(all));
-        assert_eq!(Histograms::read(&mut Reader::new(&out[..9])), None);
+        let mut back = Histograms::default();
+        back.merge_written(&mut Reader::new(&out)).unwrap();
+        assert_eq!(back, all);
+        // Onto those that are there, of which it has fewer or more ranges.
+        let mut twice = all.clone();
+        twice.merge(all.clone()).unwrap();
+        back.merge_written(&mut Reader::new(&out)).unwrap();
+        assert_eq!(back, twice);
+        let mut few = vec![];
+        Histograms::default().write(&mut few);
+        back.merge_written(&mut Reader::new(&few)).unwrap();
+        assert_eq!(back, twice);
+        let cut_off = Histograms::default().merge_written(&mut Reader::new(&out[..9]));
+        assert_eq!(cut_off, None);
+        let mut others = Histograms::default();
+        others
+            .add(1, Buckets::new(0, u32::MAX, 11), 1.0, 1)
+            .unwrap();
+        assert_eq!(others.merge_written(&mut Reader::new(&out)), None);
     }
 }

@@ -226,7 +226,9 @@ mod tests {
             (&[10u8, 11][..], &[30u8][..])
         );
         assert!(store.parts.locked().is_empty());
-        let nothing = store.shared_parts(&Path::from("nowhere"), &[0..1, 2..3]).await;
+        let nothing = store
+            .shared_parts(&Path::from("nowhere"), &[0..1, 2..3])
+            .await;
         assert!(
             matches!(nothing, Err(Error::NotFound { .. })),
             "{nothing:?}"
