@@ -3,6 +3,7 @@
 //!
 //! Files of before rows had checks or pages of their own are read whole.
 
+mod decompressed;
 mod page;
 mod whole;
 

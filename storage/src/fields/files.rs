@@ -133,7 +133,7 @@ mod tests {
             .unwrap();
         let file = store.field_file(&key).unwrap();
         // In one chunk, over the corner of four, in the last group, and twice the same.
-        let one = window(3, 5, 1, 1);
+        let one = window(3, 6, 1, 1);
         let asked = [one, window(58, 118, 4, 4), window(430, 1260, 5, 10), one];
         let reader = Reader::open(&store, &key, Some(&GRID)).await.unwrap();
         let by_requests = reader.windows(&asked).await.unwrap();
@@ -147,7 +147,7 @@ mod tests {
                 .collect()
         };
         assert_eq!(bits(&found), bits(&by_requests));
-        assert_eq!(found[0], [value(3 * 1270 + 5)]);
+        assert_eq!(found[0], [value(3 * 1270 + 6)]);
         for outside in [
             window(435, 0, 1, 1),
             window(0, 0, 0, 1),

@@ -10,10 +10,11 @@ use contract::key::ObjectKey;
 use parquet::basic::Encoding;
 use parquet::column::page::{Page, PageReader as _};
 use parquet::errors::{ParquetError, Result};
+use parquet::file::metadata::ColumnChunkMetaData;
 use parquet::file::reader::{ChunkReader, Length};
 use parquet::file::serialized_reader::SerializedPageReader;
 
-use super::{Expected, RowIndex, not_its_check};
+use super::{Expected, RowIndex, decompressed, not_its_check};
 use crate::StorageError;
 use crate::sound::damage;
 
@@ -117,8 +118,10 @@ impl Pages<'_> {
         });
         let reader = Arc::new(self.parts.clone());
         let column = meta.column(self.index.values);
+        let stored = decompressed::as_stored(column);
+        let told = stored.as_ref().unwrap_or(column);
         let reader =
-            SerializedPageReader::new(reader, column, row_count as usize, Some(pages.to_vec()));
+            SerializedPageReader::new(reader, told, row_count as usize, Some(pages.to_vec()));
         let mut reader = reader.map_err(|e| damaged(&e))?;
         let mut wanted = rows.iter().copied().peekable();
         let mut values = vec![];
@@ -134,7 +137,8 @@ impl Pages<'_> {
             }
             let page = reader.get_next_page().map_err(|e| damaged(&e))?;
             let page = page.ok_or_else(|| damaged(&"it lacks a page"))?;
-            plain_values(&page, &mut values)
+            let content = content(&page, stored.as_ref().map(|_| column));
+            plain_values(&page, &content.map_err(|e| damaged(&e))?, &mut values)
                 .ok_or_else(|| damaged(&"a page is no list of numbers"))?;
             let mut from = 0;
             for row in start..end {
@@ -158,13 +162,14 @@ impl Pages<'_> {
         let meta = self.index.meta.row_group(group);
         let rows = usize::try_from(meta.num_rows())?;
         let column = meta.column(self.index.check);
-        let mut reader =
-            SerializedPageReader::new(Arc::new(self.parts.clone()), column, rows, None)?;
+        let stored = decompressed::as_stored(column);
+        let told = stored.as_ref().unwrap_or(column);
+        let mut reader = SerializedPageReader::new(Arc::new(self.parts.clone()), told, rows, None)?;
         let mut checks = Vec::with_capacity(rows);
         while let Some(page) = reader.get_next_page()? {
             // Never null and never repeated: the page holds nothing but numbers.
             let is_plain = page.encoding() == Encoding::PLAIN;
-            let mut content = page.buffer().clone();
+            let mut content = content(&page, stored.as_ref().map(|_| column))?;
             if !is_plain || content.len() != page.num_values() as usize * 4 {
                 return Err(ParquetError::General("checks are no numbers".to_owned()));
             }
@@ -176,13 +181,20 @@ impl Pages<'_> {
     }
 }
 
+/// What a page holds; `column` is what it is of, if it was handed out as it is stored.
+fn content(page: &Page, column: Option<&ColumnChunkMetaData>) -> Result<Bytes> {
+    match column {
+        Some(column) => decompressed::page(page.buffer(), column),
+        None => Ok(page.buffer().clone()),
+    }
+}
+
 /// The numbers of a page of lists without nulls and without empty lists; none if it is another.
 ///
 /// Such a page is the length of its repetition levels and they, the length of its definition levels and they, and the
 /// numbers one behind the other. Which list a number belongs to is known without the levels.
-fn plain_values(page: &Page, values: &mut Vec<f32>) -> Option<()> {
+fn plain_values(page: &Page, content: &[u8], values: &mut Vec<f32>) -> Option<()> {
     let Page::DataPage {
-        buf,
         num_values,
         encoding: Encoding::PLAIN,
         ..
@@ -191,14 +203,14 @@ fn plain_values(page: &Page, values: &mut Vec<f32>) -> Option<()> {
         return None;
     };
     let length = |at: usize| {
-        let bytes = buf.get(at..at.checked_add(4)?)?;
+        let bytes = content.get(at..at.checked_add(4)?)?;
         Some(u32::from_le_bytes(bytes.try_into().ok()?) as usize)
     };
     let definitions = length(0)?.checked_add(4)?;
     let start = definitions
         .checked_add(length(definitions)?)?
         .checked_add(4)?;
-    let numbers = buf.get(start..)?;
+    let numbers = content.get(start..)?;
     if numbers.len() != *num_values as usize * 4 {
         return None;
     }
