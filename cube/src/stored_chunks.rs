@@ -3,14 +3,23 @@
 //! Of a folder nothing is read before somebody goes through them: then one thread reads part after part into one buffer, which takes
 //! less than a request each. Of other stores they are in memory.
 
+use std::cell::Cell;
 use std::fs::File;
-use std::io::{ErrorKind, Read as _, Seek as _, SeekFrom};
+use std::io::ErrorKind;
 use std::ops::Range;
+use std::os::unix::fs::FileExt as _;
 use std::path::PathBuf;
 
 use bytes::Bytes;
 
 pub(crate) const TOO_SHORT: &str = "its shard is shorter than its index says";
+
+/// Bytes that a thread keeps to read the next part into: fresh memory has to be mapped and cleared for every one.
+const MOST_KEPT: usize = 8 << 20;
+
+thread_local! {
+    static OF_THREAD: Cell<Vec<u8>> = const { Cell::new(vec![]) };
+}
 
 /// A chunk that cannot be read or decoded: its place among those asked for, and why.
 #[derive(Debug)]
@@ -53,32 +62,36 @@ pub(crate) struct InPart {
 #[derive(Debug, Default)]
 pub(crate) struct StoredChunks(pub(crate) Vec<Part>);
 
-/// The file that was read last.
+/// The file that was read last, and its length.
 #[derive(Default)]
-struct Opened(Option<(PathBuf, File)>);
+struct Opened(Option<(PathBuf, File, u64)>);
 
 impl Opened {
-    /// Reads a part of a file to the end of a buffer.
+    /// Reads a part of a file into a buffer from `at` on, which is made longer where it has to be.
     fn read(
         &mut self,
         path: &PathBuf,
         range: &Range<u64>,
-        to: &mut Vec<u8>,
+        (to, at): (&mut Vec<u8>, usize),
     ) -> std::io::Result<()> {
-        let file = match &mut self.0 {
-            Some((own, file)) if own == path => file,
+        let (file, file_bytes) = match &mut self.0 {
+            Some((own, file, bytes)) if own == path => (file, bytes),
             other => {
                 let opened = File::open(path)?;
-                &mut other.insert((path.clone(), opened)).1
+                let bytes = opened.metadata()?.len();
+                let (_, file, bytes) = other.insert((path.clone(), opened, bytes));
+                (file, bytes)
             }
         };
-        file.seek(SeekFrom::Start(range.start))?;
-        let count = range.end - range.start;
-        let read = file.take(count).read_to_end(to)?;
-        if (read as u64) < count {
+        // Before anything is allocated for what an index made up.
+        if range.end > *file_bytes {
             return Err(ErrorKind::UnexpectedEof.into());
         }
-        Ok(())
+        let end = at + (range.end - range.start) as usize;
+        if to.len() < end {
+            to.resize(end, 0);
+        }
+        file.read_exact_at(&mut to[at..end], range.start)
     }
 }
 
@@ -106,15 +119,27 @@ impl StoredChunks {
         &self,
         mut take: impl FnMut(usize, &[u8]) -> Result<bool, Undecoded>,
     ) -> Result<(), Undecoded> {
-        let (mut opened, mut buffer) = (Opened::default(), vec![]);
+        let mut buffer = OF_THREAD.take();
+        let gone_through = self.each_in(&mut buffer, &mut take);
+        if buffer.len() <= MOST_KEPT {
+            OF_THREAD.set(buffer);
+        }
+        gone_through
+    }
+
+    fn each_in(
+        &self,
+        buffer: &mut Vec<u8>,
+        take: &mut impl FnMut(usize, &[u8]) -> Result<bool, Undecoded>,
+    ) -> Result<(), Undecoded> {
+        let mut opened = Opened::default();
         for Part { source, chunks } in &self.0 {
             let content: &[u8] = match source {
                 Source::Held(content) => content,
                 Source::File(path, range) => {
-                    buffer.clear();
-                    let read = opened.read(path, range, &mut buffer);
+                    let read = opened.read(path, range, (buffer, 0));
                     read.map_err(|error| unread(chunks, &error))?;
-                    &buffer
+                    &buffer[..source.length()]
                 }
             };
             for InPart { number, bytes } in chunks {
@@ -140,7 +165,7 @@ impl StoredChunks {
             match source {
                 Source::Held(content) => buffer.extend_from_slice(content),
                 Source::File(path, range) => {
-                    let read = opened.read(path, range, &mut buffer);
+                    let read = opened.read(path, range, (&mut buffer, start));
                     read.map_err(|error| unread(chunks, &error))?;
                 }
             }
