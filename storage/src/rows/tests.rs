@@ -117,3 +117,17 @@ async fn a_row_that_is_damaged_or_not_there_is_an_error_that_names_the_file() {
     stored.key = ObjectKey::field(&product(), &wrong);
     assert!(sound::of_bytes(&stored.key, b"x").is_err());
 }
+
+#[tokio::test]
+async fn a_page_that_says_it_is_larger_than_its_column_is_refused_before_there_is_room_for_it() {
+    let grid = shape_only(100, 4000);
+    let (_store, stored) = stored(&grid).await;
+    let index = RowIndex::read(&stored).await.unwrap().unwrap();
+    let column = index.metadata().row_group(0).column(index.check);
+    let most = usize::try_from(column.uncompressed_size()).unwrap();
+    let page = |length: usize| zstd::bulk::compress(&vec![7; length], 1).unwrap();
+    assert_eq!(decompressed::page(&page(most), column).unwrap().len(), most);
+    let refused = decompressed::page(&page(most + 1), column).unwrap_err();
+    assert!(refused.to_string().contains("larger"), "{refused}");
+    assert!(decompressed::page(b"no page", column).is_err());
+}
