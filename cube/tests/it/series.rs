@@ -171,23 +171,26 @@ async fn removed(store: &Store, folder: &str, count: usize) {
 async fn a_few_cells_of_steps_that_no_run_holds_are_read_of_chunks_of_fields_or_else_of_maps() {
     let (steps, grid) = (months(20), grid(200, 300));
     for gone in [format!("{FOLDER}/chunks"), "frames".to_owned()] {
-        let store = Store::memory();
-        let manifest = version(&store, grid, 1, &steps).await;
-        follow(&store, &manifest).await.unwrap();
-        removed(&store, &gone, steps.len()).await;
-        let found = Values::of(&store, &Arc::new(manifest)).await.unwrap();
-        assert_eq!(found.in_fields_count(), 0);
-        for (row, col) in [(0, 0), (59, 119), (60, 120), (199, 299)] {
-            let own = series(&grid, &steps, row, col);
-            let cell = found.cell(row, col).await.unwrap();
-            assert_eq!(bits(&cell), bits(&own), "{row}, {col} without {gone}");
+        // By requests, and of files.
+        let (_folder, stores) = stores();
+        for store in stores {
+            let manifest = version(&store, grid, 1, &steps).await;
+            follow(&store, &manifest).await.unwrap();
+            removed(&store, &gone, steps.len()).await;
+            let found = Values::of(&store, &Arc::new(manifest)).await.unwrap();
+            assert_eq!(found.in_fields_count(), 0);
+            for (row, col) in [(0, 0), (59, 119), (60, 120), (199, 299)] {
+                let own = series(&grid, &steps, row, col);
+                let cell = found.cell(row, col).await.unwrap();
+                assert_eq!(bits(&cell), bits(&own), "{row}, {col} without {gone}");
+            }
+            // All cells are read of maps, which are not there in one of the two.
+            let blocks = grid.rows.div_ceil(BLOCK_CELLS) * grid.cols.div_ceil(BLOCK_CELLS);
+            let across = grid.cols.div_ceil(BLOCK_CELLS);
+            let all: Vec<[u32; 2]> = (0..blocks).map(|at| [at / across, at % across]).collect();
+            let found = found.blocks(&all, 0..steps.len()).await;
+            assert_eq!(found.is_ok(), gone == "frames");
         }
-        // All cells are read of maps, which are not there in one of the two.
-        let blocks = grid.rows.div_ceil(BLOCK_CELLS) * grid.cols.div_ceil(BLOCK_CELLS);
-        let across = grid.cols.div_ceil(BLOCK_CELLS);
-        let all: Vec<[u32; 2]> = (0..blocks).map(|at| [at / across, at % across]).collect();
-        let found = found.blocks(&all, 0..steps.len()).await;
-        assert_eq!(found.is_ok(), gone == "frames");
     }
 }
 
