@@ -40,4 +40,34 @@ impl Cited {
             unit: manifest.quantity.display().unit.to_owned(),
         }
     }
+
+    /// What the values are and their unit, for people: `Salinity`, `Wind speed at 10 m in m s⁻¹`.
+    pub fn titled(&self) -> String {
+        let title = self.quantity.title();
+        match self.unit.as_str() {
+            "" | "1" => title.to_owned(),
+            unit => format!("{title} in {unit}"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_number_without_a_unit_is_in_none() {
+        let of = |quantity: Quantity, unit: &str| Cited {
+            product: "p".parse().unwrap(),
+            manifest: "p@1-0a1b2c3d".parse().unwrap(),
+            title: String::new(),
+            source: String::new(),
+            synthetic: false,
+            quantity,
+            unit: unit.to_owned(),
+        };
+        assert_eq!(of(Quantity::Salinity, "").titled(), "Salinity");
+        assert_eq!(of(Quantity::Salinity, "1").titled(), "Salinity");
+        assert_eq!(of(Quantity::IceFraction, "%").titled(), "Sea ice in %");
+    }
 }

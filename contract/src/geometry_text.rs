@@ -2,6 +2,8 @@
 //!
 //! The library that reads GeoJSON holds what it knows nothing of as a tree; what a text may hold is counted before it is read.
 
+mod besides;
+
 use std::fmt;
 
 use geojson::GeoJson;
@@ -37,6 +39,7 @@ pub(crate) fn document(text: &str) -> Result<GeoJson, String> {
             "it holds more than {MAX_MARKS} numbers, words and lists; simplify it, or leave properties out"
         ));
     }
+    besides::check(text)?;
     text.parse()
         .map_err(|e: geojson::Error| format!("it is no GeoJSON: {}", first_line(&e)))
 }
@@ -171,6 +174,13 @@ mod tests {
             let refused = document(&text).unwrap_err();
             assert!(refused.contains("more than 6000000"), "{refused}");
         }
+        // Few marks, and a tree that takes a hundred times the text.
+        let tree = format!(
+            r#"{{"type":"Point","coordinates":[0,0],"x":[{}0]}}"#,
+            r#"{"":0},"#.repeat(1_700_000)
+        );
+        let refused = document(&tree).unwrap_err();
+        assert!(refused.contains("besides coordinates"), "{refused}");
         let long = format!(r#"{{"type":"Point"{}}}"#, " ".repeat(MAX_TEXT_BYTES));
         assert!(document(&long).unwrap_err().contains("at most 67108864"));
     }

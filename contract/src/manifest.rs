@@ -1,5 +1,6 @@
 //! The numbered list of what a product consists of: the only thing that changes, and it changes whole.
 
+mod asked;
 mod id;
 mod inside;
 mod paged;
@@ -16,6 +17,7 @@ use crate::product::ProductId;
 use crate::quantity::Quantity;
 use crate::time::{Period, TimeMs};
 
+pub use asked::AskedVersion;
 pub use id::ManifestId;
 pub use paged::{PAGE_STEPS, PAGED_SCHEMA, Page, PagedManifest};
 

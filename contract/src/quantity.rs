@@ -1,10 +1,12 @@
 //! What a product measures, in which unit it is stored, and in which unit people read it.
 
+mod flags;
 mod open;
 mod words;
 
 use crate::ContractError;
 
+pub use flags::{Flag, MAX_FLAGS, MAX_MEANING_BYTES};
 pub use open::{MAX_NAME_BYTES, MAX_TITLE_BYTES, MAX_UNIT_BYTES, OpenQuantity, OpenWords};
 
 /// Mass of carbon in one mole of CO2, kg (IUPAC 2021 standard atomic weight of carbon, conventional value 12.011).
@@ -209,7 +211,22 @@ impl Quantity {
         }
     }
 
-    /// Is it the same but for the title and the range of an open one?
+    /// What its values mean, where they are codes and a file says it.
+    pub fn flags(self) -> &'static [Flag] {
+        match self {
+            Self::Open(open) => &open.words().flags,
+            _ => &[],
+        }
+    }
+
+    /// What a code means.
+    pub fn meaning(self, code: f32) -> Option<&'static str> {
+        #[expect(clippy::float_cmp, reason = "a code is one exact number")]
+        let found = self.flags().iter().find(|flag| flag.code() == code);
+        found.map(|flag| flag.meaning.as_str())
+    }
+
+    /// Is it the same but for the words of an open one besides name and unit?
     pub fn is_same_kind(self, other: Self) -> bool {
         match (self, other) {
             (Self::Open(own), Self::Open(other)) => own.is_same_kind(other),
@@ -222,11 +239,7 @@ impl Quantity {
     pub fn joined(self, other: Self) -> Option<Self> {
         match (self, other) {
             (Self::Open(own), Self::Open(other)) if own.is_same_kind(other) => {
-                let joined = match other.words().range {
-                    Some([low, high]) => own.over(low, high).ok()?,
-                    None => own,
-                };
-                Some(Self::Open(joined))
+                own.joined(other).ok().map(Self::Open)
             }
             (
                 Self::SeaSurfaceTemperature,
@@ -259,6 +272,7 @@ impl Quantity {
             unit: unit.to_owned(),
             title: title.to_owned(),
             range: None,
+            flags: vec![],
         };
         OpenQuantity::new(words).map(Self::Open)
     }

@@ -3,6 +3,7 @@
 mod asked;
 mod cells;
 mod collection;
+mod mask;
 mod named;
 mod text;
 
@@ -12,6 +13,7 @@ use crate::ContractError;
 pub use asked::AskedRegion;
 pub use cells::Cells;
 pub use collection::{MAX_REGIONS, named_regions};
+pub use mask::MaskCode;
 pub use named::{NAMED_REGIONS, NamedRegion};
 
 /// Most corners a region's polygons may have together.

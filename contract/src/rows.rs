@@ -2,6 +2,7 @@
 //!
 //! Columns are what tables and array programs read; the texts of an answer's own JSON name every number of every row.
 
+mod budgets;
 mod columns;
 
 use std::fmt::{Display, Formatter};

@@ -1,7 +1,7 @@
 //! What the CF conventions call things: names and attributes of variables and coordinates.
 
 use contract::earth::{WGS84_EQUATORIAL_RADIUS_M, WGS84_POLAR_RADIUS_M};
-use contract::quantity::Quantity;
+use contract::quantity::{Flag, Quantity};
 use serde_json::{Map, Value, json};
 
 use crate::Description;
@@ -108,6 +108,13 @@ pub fn of_values(description: &Description) -> Map<String, Value> {
     if let Some([below, above]) = quantity.ends() {
         let comment = format!("below zero the {below}, above it the {above}");
         attributes.insert("comment".to_owned(), comment.into());
+    }
+    let flags = quantity.flags();
+    if !flags.is_empty() {
+        let codes: Vec<f32> = flags.iter().map(Flag::code).collect();
+        let meanings: Vec<&str> = flags.iter().map(|flag| flag.meaning.as_str()).collect();
+        attributes.insert("flag_values".to_owned(), json!(codes));
+        attributes.insert("flag_meanings".to_owned(), meanings.join(" ").into());
     }
     attributes
 }

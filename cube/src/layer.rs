@@ -59,7 +59,7 @@ impl Layer<'_> {
         if plan.steps.len() < before {
             self.cut_off().await?;
         }
-        if plan.steps.len() != before {
+        if plan.steps.len() != before || self.tells_codes_anew() {
             plain::write_length(&arrays, description, plan.steps.len()).await?;
         }
         let none = Levels::default();
@@ -104,6 +104,12 @@ impl Layer<'_> {
             }
             Err(error) => Err(self.repository.failed("committing", &error)),
         }
+    }
+
+    /// Are codes said to mean something else than in the state that is there?
+    fn tells_codes_anew(&self) -> bool {
+        let before = self.state.description.as_ref();
+        before.is_some_and(|before| before.quantity.flags() != self.description.quantity.flags())
     }
 
     /// Removes all that is there: cells of another grid or quantity have no place in what comes.

@@ -239,7 +239,7 @@ fn pairs(file: &File, name: &str, numbers: &[f64], axes: [&Dataset; 2]) -> hdf5:
     attach(file, &bounds, &axes)
 }
 
-/// Texts as texts, numbers as numbers, and what this program keeps for itself as JSON.
+/// Texts as texts, numbers as numbers, lists of numbers in the type of values, and what this program keeps for itself as JSON.
 fn attributes(owner: &Location, said: Map<String, Value>) -> hdf5::Result<()> {
     for (name, value) in said {
         match value {
@@ -250,6 +250,12 @@ fn attributes(owner: &Location, said: Map<String, Value>) -> hdf5::Result<()> {
                     .new_attr::<f64>()
                     .create(name.as_str())?
                     .write_scalar(&number)?;
+            }
+            Value::Array(all) if all.iter().all(Value::is_number) => {
+                let numbers = all.iter().filter_map(Value::as_f64);
+                let numbers: Vec<f32> = numbers.map(|number| number as f32).collect();
+                let attribute = owner.new_attr::<f32>().shape([numbers.len()]);
+                attribute.create(name.as_str())?.write_raw(&numbers)?;
             }
             other => texts(owner, &[(name.as_str(), other.to_string().as_str())])?,
         }

@@ -39,7 +39,7 @@ pub(crate) use attach::Attach;
 pub(crate) use budget::Budget;
 pub(crate) use derive::{Derive, DeriveCo2Flux, DeriveWhat, Expression, Regrid};
 pub(crate) use derived::DeriveStatistic;
-pub(crate) use export::{Export, ExportFormat, ExportedProduct};
+pub(crate) use export::{Export, ExportFormat};
 pub(crate) use fill::{BenchFill, FillError, ProductsOf};
 pub(crate) use flight_sql::FlightSql;
 pub(crate) use ground::{Ground, GroundOptions};
@@ -55,7 +55,7 @@ pub(crate) use services::{
 };
 pub(crate) use show::settings as shown_settings;
 pub(crate) use sql::{SqlFormat, SqlQuestion};
-pub(crate) use statistics::{StatisticsOptions, Stats, StatsLine, StatsPoint, StatsPolygon};
+pub(crate) use statistics::{Stats, StatsLine, StatsPoint, StatsPolygon};
 pub(crate) use surroundings::Surroundings;
 pub(crate) use upkeep::{Gc, Migrate, Recompute, RecomputeWhat, Survey, Verify};
 

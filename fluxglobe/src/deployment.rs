@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use anyhow::{Context as _, Result, bail};
 use compute::Engine;
-use contract::manifest::Manifest;
+use contract::manifest::{AskedVersion, Manifest};
 use contract::product::ProductId;
 use kafka_log::{KafkaLog, KafkaSettings};
 use prometheus::Registry;
@@ -191,4 +191,24 @@ pub(crate) async fn manifest(store: &Store, product: &ProductId, data: &Path) ->
         "there is no product {product}; there are {}",
         known.join(", ")
     )
+}
+
+/// The version of a product that is asked for, or an error that says what there is.
+pub(crate) async fn version(store: &Store, asked: &AskedVersion, data: &Path) -> Result<Manifest> {
+    let product = &asked.product;
+    let newest = manifest(store, product, data).await?;
+    let Some(number) = asked.number else {
+        return Ok(newest);
+    };
+    let Some(manifest) = storage::manifests::numbered(store, product, number).await? else {
+        bail!(
+            "{product} has no version {number} (any more); its newest is {}",
+            newest.id()
+        );
+    };
+    let id = manifest.id();
+    if !asked.is(&manifest, &id) {
+        bail!("version {number} of {product} is {id}, not {asked}");
+    }
+    Ok(manifest)
 }

@@ -17,6 +17,7 @@ use contract::geometry::Geometry;
 use contract::grid::LonLatDeg;
 use contract::job::RenderJob;
 use contract::manifest::{Manifest, ManifestId};
+use contract::region::{AskedRegion, MaskCode};
 use contract::rows::{Columns, RowsForm};
 use contract::series::{PointSeries, RegionSeries, RegionSeriesQuery};
 use contract::statistics::{StatisticsAnswer, StatisticsQuery};
@@ -166,6 +167,15 @@ impl Analyse for Analyst {
         };
         let answer = compute::reduce::statistics_of(engine, query, manifest, id.clone());
         answer.await.map_err(compute_failed)
+    }
+
+    async fn mask_region(
+        &self,
+        mask: &Manifest,
+        code: &MaskCode,
+    ) -> Result<AskedRegion, BackendError> {
+        let region = compute::region::mask::region(self.local.store(), mask, code);
+        region.await.map_err(compute_failed)
     }
 
     async fn made_of_series(

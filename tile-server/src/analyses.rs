@@ -12,6 +12,7 @@ use contract::budget::{
 use contract::check::Check;
 use contract::digest::Digest;
 use contract::grid::LonLatDeg;
+use contract::region::{AskedRegion, MaskCode, Polygon, Region};
 use contract::rows::{RowsForm, Tabular};
 use contract::series::RegionSeriesQuery;
 use contract::statistics::StatisticsQuery;
@@ -37,11 +38,25 @@ const HISTORIES: usize = 100;
 const TEXTS: usize = 200;
 /// Bytes of all of them: a hundred regions over 16 years of days.
 const TEXT_BYTES: u64 = 128 << 20;
+/// Regions of masks that are remembered, a guess that sizes tables; a basin of a mask of one degree takes some 10 KiB.
+const MASK_REGIONS: usize = 100;
+/// Bytes of all of them.
+const MASK_REGION_BYTES: u64 = 32 << 20;
 /// What is made of series and remembered; a Hovmöller diagram takes 8 MiB at most.
 const MADE_OF_SERIES: usize = 40;
 
 fn text_bytes(text: &Bytes) -> u64 {
     text.len() as u64 + 1
+}
+
+/// What the rectangles of a region of a mask take.
+pub(crate) fn region_bytes(region: &AskedRegion) -> u64 {
+    /// A rectangle: its corners, and what holds them.
+    const RECTANGLE_BYTES: usize = 4 * size_of::<[f64; 2]>() + size_of::<Polygon>();
+    match &region.region {
+        Region::Polygons(all) => (all.len() * RECTANGLE_BYTES) as u64,
+        Region::Global | Region::Box { .. } => 0,
+    }
 }
 
 /// Rows of an answer, those of its regions too.
@@ -77,6 +92,7 @@ pub struct Analyses {
     /// Series and statistics as they are answered, which takes longer to write than values take to read.
     texts: Answers<Bytes>,
     made_of_series: Answers<MadeOfSeries>,
+    mask_regions: Answers<AskedRegion>,
 }
 
 /// Answers of one kind, by the digest of what was asked: those remembered and those under way.
@@ -146,6 +162,9 @@ impl Analyses {
             histories: Answers::new(HISTORIES, HISTORIES as u64, |_one| 1),
             texts: Answers::new(TEXTS, TEXT_BYTES, text_bytes),
             made_of_series: Answers::new(MADE_OF_SERIES, MADE_OF_SERIES as u64, |_one| 1),
+            mask_regions: Answers::new(MASK_REGIONS, MASK_REGION_BYTES, |one| {
+                region_bytes(one) + 1
+            }),
         }
     }
 
@@ -253,6 +272,20 @@ impl Analyses {
             written(&*analyst, &answer, form)
         };
         self.text(key, computed).await
+    }
+
+    /// The cells where a mask has a code.
+    pub async fn mask_region(
+        &self,
+        mask: &Layer,
+        code: MaskCode,
+    ) -> Result<Arc<AskedRegion>, ServerError> {
+        let key = Digest::of_json(&("mask region", &mask.id, code.to_string()));
+        let (analyst, manifest) = (Arc::clone(&self.analyst), Arc::clone(&mask.manifest));
+        let computed = async move { analyst.mask_region(&manifest, &code).await };
+        self.mask_regions
+            .answer(key, &self.gate, &self.metrics, computed)
+            .await
     }
 
     /// Our budgets beside published ones.

@@ -20,6 +20,7 @@ use contract::grid::LonLatDeg;
 use contract::job::RenderJob;
 use contract::manifest::{Manifest, ManifestId};
 use contract::observation::{Filter, Page, Platform, TrackPoint, TrackQuery};
+use contract::region::{AskedRegion, MaskCode};
 use contract::rows::{Columns, RowsForm};
 use contract::series::{PointSeries, RegionSeries, RegionSeriesQuery};
 use contract::statistics::{StatisticsAnswer, StatisticsQuery};
@@ -169,6 +170,14 @@ pub trait Analyse: Send + Sync + 'static {
         id: &ManifestId,
         query: &StatisticsQuery,
     ) -> Result<StatisticsAnswer, BackendError>;
+
+    /// The cells where a version of a mask has a code, as a region that is called by both.
+    async fn mask_region(
+        &self,
+        mask: &Manifest,
+        code: &MaskCode,
+    ) -> Result<AskedRegion, BackendError>;
+
     /// What is made of series of versions of products.
     async fn made_of_series(&self, question: &SeriesQuestion)
     -> Result<MadeOfSeries, BackendError>;

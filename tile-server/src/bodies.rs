@@ -1,7 +1,5 @@
 //! Geometries that are sent along with a question: a request's body in, its text out, within a limit of bytes for all of them.
 
-mod besides;
-
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -139,6 +137,11 @@ impl Bodies {
         })
     }
 
+    /// Room for what is made of an address of the client that asks.
+    pub(crate) fn room(&self, bytes: u64) -> Result<Room, ServerError> {
+        self.enter(Client::asking(), bytes)
+    }
+
     fn enter(&self, client: Client, bytes: u64) -> Result<Room, ServerError> {
         let mut clients = self.held.clients();
         let all: u64 = clients.values().sum();
@@ -167,8 +170,7 @@ impl Sent {
         let (text, room) = (self.text, self.room);
         // Who goes away meanwhile leaves the room in use until the text is read.
         let reading = tokio::task::spawn_blocking(move || {
-            let besides = besides::check(&text).map_err(|reason| ServerError::Body { reason });
-            let read = besides.and_then(|()| read(text));
+            let read = read(text);
             drop(turn);
             read.map(|meant| (meant, room))
         });

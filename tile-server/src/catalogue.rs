@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use contract::budget::AsOf;
 use contract::flow::check_parts;
-use contract::manifest::ManifestId;
+use contract::manifest::{AskedVersion, ManifestId};
 use contract::product::ProductId;
 use contract::quantity::Quantity;
 use futures::FutureExt as _;
@@ -97,7 +97,7 @@ impl Catalogue {
         }
     }
 
-    /// The version of a product that `manifest` names; the newest one if it names none.
+    /// The version of a product that `manifest` names, with or without its digest; the newest one if it names none.
     pub async fn version(
         &self,
         product: &str,
@@ -107,7 +107,13 @@ impl Catalogue {
         let Some(name) = manifest else {
             return Ok(newest);
         };
-        let id: ManifestId = name.parse()?;
+        let id: ManifestId = match name.parse::<AskedVersion>() {
+            // Its digest is left out.
+            Ok(asked) if asked.number.is_some() && asked.digest.is_none() => {
+                return self.asked_of(newest, &asked).await;
+            }
+            _ => name.parse()?,
+        };
         if id == newest.id {
             return Ok(newest);
         }
@@ -116,6 +122,35 @@ impl Catalogue {
                 manifest: id.to_string(),
             });
         }
+        let older = self.reader.versions.layer(&id).await?;
+        Ok(drifting(older, newest.northward.as_ref()))
+    }
+
+    /// The version that is asked for by as much of its name as somebody knows.
+    pub(crate) async fn asked(&self, asked: &AskedVersion) -> Result<Arc<Layer>, ServerError> {
+        let newest = self.layer(asked.product.as_str()).await?;
+        self.asked_of(newest, asked).await
+    }
+
+    async fn asked_of(
+        &self,
+        newest: Arc<Layer>,
+        asked: &AskedVersion,
+    ) -> Result<Arc<Layer>, ServerError> {
+        let unknown = || ServerError::UnknownVersion {
+            manifest: asked.to_string(),
+        };
+        if asked.product != newest.manifest.product {
+            return Err(unknown());
+        }
+        let number = match asked.number {
+            Some(number) if !asked.is(&newest.manifest, &newest.id) => number,
+            _ => return Ok(newest),
+        };
+        let found = manifests::numbered(&self.reader.store, &asked.product, number).await?;
+        let id = found.map(|found| (found.id(), found));
+        let id = id.filter(|(id, found)| asked.is(found, id));
+        let (id, _found) = id.ok_or_else(unknown)?;
         let older = self.reader.versions.layer(&id).await?;
         Ok(drifting(older, newest.northward.as_ref()))
     }

@@ -18,7 +18,8 @@
 //!
 //! Tiles, views, TileJSON and legends take how a picture is to look, in the unit people read (`look.rs`).
 //!
-//! A geometry that no address has room for is sent along by POST (`bodies.rs`), which asks what GET asks.
+//! A geometry that no address has room for is sent along by POST (`bodies.rs`), which asks what GET asks. A region may be the cells
+//! of a landed mask that have a code, `region=MASK:CODE` (`masks.rs`).
 //!
 //! `/zarr/PRODUCT` is the product's cube by keys of Zarr, as it lies in the store (`cubes.rs`).
 //!
@@ -43,6 +44,7 @@ mod gate;
 mod ground;
 pub mod live;
 mod look;
+mod masks;
 pub mod metrics;
 mod middleware;
 mod openapi;

@@ -60,6 +60,7 @@ const RETRY_AFTER: &str = "Seconds after which the same request may succeed";
         budget::get,
         budget::post,
         budget::history,
+        budget::post_history,
         check::get,
         zarr::get,
         platforms::get,

@@ -81,6 +81,10 @@ fn of_geometries() -> Router<AppState> {
             "/api/products/{product}/budget",
             get(budget::get).post(budget::post),
         )
+        .route(
+            "/api/products/{product}/budget/history",
+            get(budget::history).post(budget::post_history),
+        )
         .method_not_allowed_fallback(async || ServerError::AskedOnly)
 }
 
@@ -115,10 +119,6 @@ pub fn router(state: AppState) -> Router {
         .route("/api/products", get(products::list))
         .route("/api/products/{product}/point", get(point::get))
         .route("/api/products/{product}/hovmoller", get(hovmoller::get))
-        .route(
-            "/api/products/{product}/budget/history",
-            get(budget::history),
-        )
         .route("/api/products/{product}/{legend_file}", get(legend::get))
         .route("/api/regions", get(regions::list))
         .route("/api/palettes", get(palettes::list))

@@ -100,8 +100,11 @@ pub fn difference<'a>(
         let b = read::series(engine, minus.0, minus.1, all).await?;
         if a.cited.unit != b.cited.unit || a.cited.quantity != b.cited.quantity {
             let reason = format!(
-                "{} is in {}, {} in {}: they have no difference",
-                a.cited.product, a.cited.unit, b.cited.product, b.cited.unit
+                "{} holds {}, {} holds {}: they have no difference",
+                a.cited.product,
+                a.cited.titled(),
+                b.cited.product,
+                b.cited.titled()
             );
             return Err(
                 ContractError::invalid("difference", &b.cited.product.to_string(), reason).into(),

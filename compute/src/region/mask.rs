@@ -1,12 +1,11 @@
-//! A region of the cells where a mask has a code: `PRODUCT:CODE` in, polygons along the edges of these cells out, so that it
-//! is a region on any grid.
+//! A region of the cells where a mask has a code: a version of the mask and the code, or what it means, in; polygons along the
+//! edges of these cells out, so that it is a region on any grid.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use contract::grid::Grid;
 use contract::manifest::Manifest;
-use contract::product::ProductId;
-use contract::region::{AskedRegion, MAX_CORNERS, MAX_REGIONS, Polygon, Region};
+use contract::region::{AskedRegion, MAX_CORNERS, MAX_REGIONS, MaskCode, Polygon, Region};
 use futures::future::BoxFuture;
 use storage::{Store, fields};
 
@@ -16,23 +15,18 @@ use crate::workshop::Workshop;
 /// Codes that are named where the one asked for is not there.
 const NAMED_CODES: usize = 20;
 
-/// The product and the code of `PRODUCT:CODE`; none if the text is not that.
-pub fn asked(text: &str) -> Option<(ProductId, f32)> {
-    let (product, code) = text.split_once(':')?;
-    let code: f32 = code.trim().parse().ok()?;
-    Some((product.parse().ok()?, code)).filter(|_| code.is_finite())
-}
-
 /// The cells of a mask that have the code, as a region named after the version of the mask.
 ///
 /// # Errors
-/// `Region` if the product has several maps, no cell with the code, or cells too scattered; its field cannot be read.
+/// `Region` if the product has several maps, no code of this meaning, no cell with the code, or cells too scattered; its field
+/// cannot be read.
 pub fn region<'a>(
     store: &'a Store,
     mask: &'a Manifest,
-    code: f32,
+    code: &'a MaskCode,
 ) -> BoxFuture<'a, Result<AskedRegion, ComputeError>> {
     Box::pin(async move {
+        let code = code.number(mask)?;
         let (mut traced, mut codes) = (Traced::of(code), Codes::default());
         let workshop = Workshop::of(store);
         each_row(workshop, mask, |row, values| {
@@ -180,7 +174,10 @@ impl Traced {
         }
         Ok(AskedRegion {
             region: Region::Polygons(self.found),
-            name: format!("{}:{code}", mask.id()),
+            name: match mask.quantity.meaning(code) {
+                Some(meaning) => format!("{}:{code} ({meaning})", mask.id()),
+                None => format!("{}:{code}", mask.id()),
+            },
         })
     }
 }
@@ -234,7 +231,8 @@ mod tests {
     use contract::earth::Earth;
     use contract::key::ObjectKey;
     use contract::manifest::{MANIFEST_SCHEMA, Step};
-    use contract::quantity::Quantity;
+    use contract::product::ProductId;
+    use contract::quantity::{Flag, OpenQuantity, OpenWords, Quantity};
     use contract::time::Period;
 
     const GRID: Grid = Grid {
@@ -380,25 +378,57 @@ mod tests {
         let names: Vec<String> = all.into_iter().map(|own| own.name).collect();
         let wanted = ["0", "1", "2"].map(|code| format!("{}:{code}", mask.id()));
         assert_eq!(names, wanted);
-        let none = region(&store, &mask, 7.0).await.unwrap_err().to_string();
+        let of = |code: MaskCode| {
+            let (store, mask) = (&store, &mask);
+            async move { region(store, mask, &code).await }
+        };
+        let none = of(MaskCode::Number(7.0)).await.unwrap_err().to_string();
         assert!(none.contains("there are 0, 1, 2"), "{none}");
+        let word = MaskCode::Meaning("square".to_owned());
+        let none = of(word).await.unwrap_err().to_string();
+        assert!(none.contains("does not say"), "{none}");
     }
 
-    #[test]
-    fn a_code_follows_the_name_of_a_product() {
-        let of = |text| asked(text).map(|(product, code)| (product.to_string(), code));
-        assert_eq!(of("oceans:3"), Some(("oceans".to_owned(), 3.0)));
-        assert_eq!(of("oceans:-1.5"), Some(("oceans".to_owned(), -1.5)));
-        for text in [
-            "oceans",
-            "oceans:",
-            "oceans:x",
-            "oceans:nan",
-            "A:1",
-            "{\"a\":1}",
-            "http://a:1",
-        ] {
-            assert_eq!(of(text), None, "{text}");
-        }
+    #[tokio::test]
+    async fn a_code_is_asked_for_by_what_it_means_and_told_with_it() {
+        let values: Vec<f32> = (0..LARGE.cell_count())
+            .map(|cell| if cell % 130 < 65 { 12.0 } else { 1.0 })
+            .collect();
+        let store = Store::memory();
+        let flag = |value, meaning: &str| Flag {
+            value,
+            meaning: meaning.to_owned(),
+        };
+        let words = OpenWords {
+            name: "basin".to_owned(),
+            unit: "1".to_owned(),
+            title: "Basin".to_owned(),
+            range: None,
+            flags: vec![flag(12, "west"), flag(3, "nowhere")],
+        };
+        let mask = Manifest {
+            quantity: Quantity::Open(OpenQuantity::new(words).unwrap()),
+            ..landed(&store, &values).await
+        };
+        let of = |text: &str| {
+            let (_mask, code) = MaskCode::split(&format!("basins:{text}")).unwrap();
+            let (store, mask) = (&store, &mask);
+            async move { region(store, mask, &code).await }
+        };
+        let west = of("west").await.unwrap();
+        assert_eq!(west, of("12").await.unwrap());
+        assert_eq!(west.name, format!("{}:12 (west)", mask.id()));
+        assert_eq!(of("1").await.unwrap().name, format!("{}:1", mask.id()));
+        let names: Vec<_> = regions(&store, &mask).await.unwrap();
+        let names: Vec<_> = names.iter().map(|own| own.name.clone()).collect();
+        assert_eq!(names, [format!("{}:1", mask.id()), west.name]);
+        // Meant by a code that no cell has, and by none.
+        let none = of("nowhere").await.unwrap_err().to_string();
+        assert!(
+            none.contains("3: no cell has this code; there are 1, 12"),
+            "{none}"
+        );
+        let none = of("East").await.unwrap_err().to_string();
+        assert!(none.contains("there are nowhere, west"), "{none}");
     }
 }

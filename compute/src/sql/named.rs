@@ -2,6 +2,7 @@
 
 use contract::manifest::Manifest;
 use contract::product::ProductId;
+use contract::region::MaskCode;
 use storage::manifests;
 
 use crate::{ComputeError, Engine};
@@ -36,11 +37,10 @@ impl Named {
         })
     }
 
-    /// A mask and a code, `name:3`, the name as of [`Self::of`]: the cells where that mask has this code.
-    pub(super) fn with_code(text: &str) -> Option<(Self, f32)> {
-        let (mask, code) = text.split_once(':')?;
-        let code: f32 = code.trim().parse().ok()?;
-        Some((Self::of(mask)?, code)).filter(|_| code.is_finite())
+    /// A mask and a code or what it means, `name:3`, the name as of [`Self::of`]: the cells where that mask has this code.
+    pub(super) fn with_code(text: &str) -> Option<(Self, MaskCode)> {
+        let (mask, code) = MaskCode::split(text)?;
+        Some((Self::of(mask)?, code))
     }
 
     /// The version that must be there.
@@ -100,11 +100,15 @@ mod tests {
         };
         let p = "a-b".to_owned();
         assert_eq!(of("a_b:3"), Some((p.clone(), None, "3".to_owned())));
-        assert_eq!(of("a-b@2:-1.5"), Some((p, Some(2), "-1.5".to_owned())));
+        assert_eq!(
+            of("a-b@2:-1.5"),
+            Some((p.clone(), Some(2), "-1.5".to_owned()))
+        );
+        assert_eq!(of("a_b:x_y"), Some((p, None, "x_y".to_owned())));
         for wrong in [
             "a-b",
             "a-b:",
-            "a-b:x",
+            "a-b:x y",
             "a-b:nan",
             "A:1",
             "{\"a\":1}",

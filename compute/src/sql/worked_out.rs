@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use async_trait::async_trait;
 use contract::manifest::Manifest;
-use contract::region::AskedRegion;
+use contract::region::{AskedRegion, MaskCode};
 use datafusion::arrow::array::{ArrayRef, RecordBatch, TimestampMillisecondArray};
 use datafusion::arrow::datatypes::SchemaRef;
 use datafusion::catalog::memory::MemorySourceConfig;
@@ -114,7 +114,7 @@ struct AnswerTable {
     engine: Engine,
     product: Named,
     /// Whose cells with this code the question is of, if it is.
-    mask: Option<(Named, f32)>,
+    mask: Option<(Named, MaskCode)>,
     question: Arc<dyn Question>,
 }
 
@@ -126,7 +126,7 @@ impl AnswerTable {
             return self.question.rows(engine, &manifest).await;
         };
         let codes = named.required(engine).await?;
-        let region = mask::region(engine.store(), &codes, *code).await?;
+        let region = mask::region(engine.store(), &codes, code).await?;
         self.question.over(region).rows(engine, &manifest).await
     }
 }

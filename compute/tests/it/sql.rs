@@ -13,7 +13,7 @@ use contract::budget::BudgetQuery;
 use contract::earth::Earth;
 use contract::geometry::AskedGeometry;
 use contract::grid::{Grid, LonLatDeg};
-use contract::quantity::Quantity;
+use contract::quantity::{Flag, OpenQuantity, OpenWords, Quantity};
 use contract::statistics::StatisticsQuery;
 use contract::time::{Period, TimeMs, TimeStep};
 use datafusion::arrow::array::{Array as _, AsArray as _, RecordBatch};
@@ -669,7 +669,18 @@ async fn cells_of_a_mask_are_a_region_of_each_function() {
         _ => f32::NAN,
     };
     let codes: Vec<f32> = (0..GRID.cell_count()).map(code).collect();
-    let basin = Quantity::open("basin", "1", "Basin").unwrap();
+    let flag = |value, meaning: &str| Flag {
+        value,
+        meaning: meaning.to_owned(),
+    };
+    let words = OpenWords {
+        name: "basin".to_owned(),
+        unit: "1".to_owned(),
+        title: "Basin".to_owned(),
+        range: None,
+        flags: vec![flag(3, "filled"), flag(1, "rest")],
+    };
+    let basin = Quantity::Open(OpenQuantity::new(words).unwrap());
     let year = [(Period::year(2000).unwrap(), codes)];
     land(&store, &product("my-basins"), basin, GRID, &year).await;
     let sql = sql_of(&engine);
@@ -694,7 +705,7 @@ async fn cells_of_a_mask_are_a_region_of_each_function() {
             numbers.collect()
         };
         let (whole, filled) = (of("global").await, of(BOX).await);
-        for place in ["my-basins:3", "my_basins@1:3"] {
+        for place in ["my-basins:3", "my_basins@1:3", "my_basins:filled"] {
             let found = of(place).await;
             let is_near = |(a, b): (&f64, &f64)| (a - b).abs() <= 1e-9 * b.abs();
             assert!(

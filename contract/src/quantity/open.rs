@@ -8,6 +8,7 @@ use std::sync::{Mutex, PoisonError};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use super::flags::Flag;
 use crate::ContractError;
 
 /// Longest name, bytes: CF standard names stay below.
@@ -16,7 +17,8 @@ pub const MAX_NAME_BYTES: usize = 128;
 pub const MAX_UNIT_BYTES: usize = 64;
 /// Longest title, bytes.
 pub const MAX_TITLE_BYTES: usize = 256;
-/// Most open quantities that a program knows at a time, all ranges counted: some 2 MB.
+/// Most open quantities that a program knows at a time, all ranges counted; one of more than a KiB, by what its codes mean, counts as
+/// several. Mostly some 2 MB, never more than 30.
 pub(super) const MAX_OPEN: usize = 8192;
 /// Values beyond are no range for colours.
 const MAX_RANGE: f64 = 1e20;
@@ -40,6 +42,10 @@ pub struct OpenWords {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(value_type = Option<(f64, f64)>, nullable = false)]
     pub range: Option<[f64; 2]>,
+    /// What its values mean, where they are codes, in the order of values: `flag_values` and `flag_meanings` of CF.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schema(required = false)]
+    pub flags: Vec<Flag>,
 }
 
 struct Known {
@@ -47,8 +53,18 @@ struct Known {
     shown_unit: String,
 }
 
-/// All that are known, by their JSON.
-static KNOWN: Mutex<BTreeMap<String, &'static Known>> = Mutex::new(BTreeMap::new());
+/// All that are known.
+struct All {
+    /// By their JSON.
+    quantities: BTreeMap<String, &'static Known>,
+    /// What they count together.
+    weight: usize,
+}
+
+static KNOWN: Mutex<All> = Mutex::new(All {
+    quantities: BTreeMap::new(),
+    weight: 0,
+});
 
 impl OpenQuantity {
     /// The quantity of these words; its range is rounded outwards to two digits.
@@ -57,6 +73,7 @@ impl OpenQuantity {
     /// A word out of its limits, or too many quantities.
     pub fn new(mut words: OpenWords) -> Result<Self, ContractError> {
         validate(&words)?;
+        words.flags.sort_by_key(|flag| flag.value);
         words.range = words.range.map(|[low, high]| {
             let within = |value: f64| value.clamp(-MAX_RANGE, MAX_RANGE);
             // Not -0.
@@ -68,10 +85,11 @@ impl OpenQuantity {
         let key = serde_json::to_string(&words)
             .map_err(|e| ContractError::invalid("quantity", &words.name, e.to_string()))?;
         let mut all = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(known) = all.get(&key) {
+        if let Some(known) = all.quantities.get(&key) {
             return Ok(Self(known));
         }
-        if all.len() >= MAX_OPEN {
+        let weight = all.weight + key.len().div_ceil(1 << 10);
+        if weight > MAX_OPEN {
             let reason = format!(
                 "{MAX_OPEN} quantities that are not built in are known at most; start the program anew"
             );
@@ -82,7 +100,8 @@ impl OpenQuantity {
             words,
         };
         let known: &'static Known = Box::leak(Box::new(known));
-        all.insert(key, known);
+        all.quantities.insert(key, known);
+        all.weight = weight;
         Ok(Self(known))
     }
 
@@ -102,7 +121,7 @@ impl OpenQuantity {
         name == "correlation" || name.ends_with("_anomaly") || name.ends_with("_trend")
     }
 
-    /// Is it the same but for title and range?
+    /// Is it the same but for title, range and what its codes mean?
     pub fn is_same_kind(self, other: Self) -> bool {
         let (own, other) = (self.words(), other.words());
         own.name == other.name && own.unit == other.unit
@@ -120,6 +139,27 @@ impl OpenQuantity {
         Self::new(OpenWords {
             range: Some([low, high]),
             ..self.words().clone()
+        })
+    }
+}
+
+impl OpenQuantity {
+    /// The same over the range of another one of its kind too; its codes mean what the other one says, if that says it.
+    ///
+    /// # Errors
+    /// Too many quantities.
+    pub(super) fn joined(self, other: Self) -> Result<Self, ContractError> {
+        let (own, other) = (self.words(), other.words());
+        let flags = if other.flags.is_empty() {
+            &own.flags
+        } else {
+            &other.flags
+        };
+        let ranges = [own.range, other.range].into_iter().flatten();
+        Self::new(OpenWords {
+            range: ranges.reduce(|[l, h], [low, high]| [l.min(low), h.max(high)]),
+            flags: flags.clone(),
+            ..own.clone()
         })
     }
 }
@@ -152,6 +192,7 @@ fn validate(words: &OpenWords) -> Result<(), ContractError> {
         unit,
         title,
         range,
+        flags,
     } = words;
     let is_name = name.starts_with(|c: char| c.is_ascii_lowercase())
         && name
@@ -176,7 +217,7 @@ fn validate(words: &OpenWords) -> Result<(), ContractError> {
         let reason = "two finite numbers".to_owned();
         return Err(ContractError::invalid("range", name, reason));
     }
-    Ok(())
+    Flag::check(flags).map_err(|reason| ContractError::invalid("flags", name, reason))
 }
 
 /// The least number of two digits (and a power of ten) that is not below; one that is read a last bit off is itself.
@@ -234,6 +275,7 @@ mod tests {
             unit: unit.to_owned(),
             title: "Title".to_owned(),
             range,
+            flags: vec![],
         }
     }
 
@@ -265,6 +307,47 @@ mod tests {
         assert_eq!(one.words().range, Some([-5.5, 2.0]));
         assert_ne!(one, plain);
         assert!(one.is_same_kind(plain));
+    }
+
+    #[test]
+    fn what_codes_mean_is_kept_in_their_order_and_told_anew_by_who_joins() {
+        let flag = |value, meaning: &str| Flag {
+            value,
+            meaning: meaning.to_owned(),
+        };
+        let of = |flags: Vec<Flag>, range| {
+            let plain = words("basin", "1", range);
+            OpenQuantity::new(OpenWords { flags, ..plain }).unwrap()
+        };
+        let plain = of(vec![], Some([1.0, 9.0]));
+        let own = of(vec![flag(2, "b"), flag(1, "a")], None);
+        assert_eq!(own.words().flags, [flag(1, "a"), flag(2, "b")]);
+        assert!(own != plain && own.is_same_kind(plain));
+        let found = own.over(0.0, 5.0).unwrap();
+        assert_eq!(found.words().flags, own.words().flags);
+        for (joined, range) in [
+            (plain.joined(own), [1.0, 9.0]),
+            (own.joined(plain), [1.0, 9.0]),
+            (found.joined(plain), [0.0, 9.0]),
+        ] {
+            let words = joined.unwrap().words();
+            assert_eq!(
+                (&words.flags, words.range),
+                (&own.words().flags, Some(range))
+            );
+        }
+        let newer = of(vec![flag(1, "c")], None);
+        assert_eq!(found.joined(newer).unwrap().words().flags, [flag(1, "c")]);
+        let json = serde_json::to_string(own.words()).unwrap();
+        let wanted = r#","flags":[{"value":1,"meaning":"a"},{"value":2,"meaning":"b"}]}"#;
+        assert!(json.ends_with(wanted), "{json}");
+        let again: OpenWords = serde_json::from_str(&json).unwrap();
+        assert_eq!(OpenQuantity::new(again).unwrap(), own);
+        let twice = OpenWords {
+            flags: vec![flag(1, "a"), flag(1, "b")],
+            ..words("basin", "1", None)
+        };
+        assert!(OpenQuantity::new(twice).is_err());
     }
 
     #[test]

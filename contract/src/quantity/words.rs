@@ -9,7 +9,7 @@ use utoipa::openapi::schema::{ObjectBuilder, OneOfBuilder, Schema, SchemaType, T
 use utoipa::openapi::{Ref, RefOr};
 use utoipa::{PartialSchema, ToSchema};
 
-use super::{OpenQuantity, OpenWords, Quantity};
+use super::{Flag, OpenQuantity, OpenWords, Quantity};
 
 impl Quantity {
     /// Its one word, as JSON and variables of cubes have it; of an open one its name.
@@ -100,6 +100,7 @@ impl PartialSchema for Quantity {
 impl ToSchema for Quantity {
     fn schemas(schemas: &mut Vec<(String, RefOr<Schema>)>) {
         schemas.push((OpenWords::name().into_owned(), OpenWords::schema()));
+        schemas.push((Flag::name().into_owned(), Flag::schema()));
     }
 }
 

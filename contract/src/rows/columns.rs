@@ -1,4 +1,4 @@
-//! Columns of answers: instants, numbers with gaps, whole numbers, flags.
+//! Columns of answers: instants, numbers with gaps, whole numbers, flags, words.
 
 use serde::Serialize;
 
@@ -39,6 +39,8 @@ pub enum ColumnValues {
     Counts(Vec<Option<u32>>),
     /// Is it so?
     Flags(Vec<bool>),
+    /// Names, words, and numbers that are exact as decimal text.
+    Texts(Vec<Option<String>>),
 }
 
 impl ColumnValues {
@@ -50,6 +52,7 @@ impl ColumnValues {
             Self::Numbers(own) => own.len(),
             Self::Counts(own) => own.len(),
             Self::Flags(own) => own.len(),
+            Self::Texts(own) => own.len(),
         }
     }
 
@@ -72,7 +75,7 @@ pub trait Tabular {
     fn columns(&self) -> Columns;
 }
 
-fn column(name: &str, unit: Option<&str>, values: ColumnValues) -> Column {
+pub(super) fn column(name: &str, unit: Option<&str>, values: ColumnValues) -> Column {
     Column {
         name: name.to_owned(),
         unit: unit.map(str::to_owned),
@@ -80,7 +83,7 @@ fn column(name: &str, unit: Option<&str>, values: ColumnValues) -> Column {
     }
 }
 
-fn instants<R>(name: &str, rows: &[R], of: impl Fn(&R) -> TimeMs) -> Column {
+pub(super) fn instants<R>(name: &str, rows: &[R], of: impl Fn(&R) -> TimeMs) -> Column {
     column(
         name,
         None,
@@ -88,9 +91,19 @@ fn instants<R>(name: &str, rows: &[R], of: impl Fn(&R) -> TimeMs) -> Column {
     )
 }
 
-fn numbers<R>(name: &str, unit: &str, rows: &[R], of: impl Fn(&R) -> Option<f64>) -> Column {
+pub(super) fn numbers<R>(
+    name: &str,
+    unit: &str,
+    rows: &[R],
+    of: impl Fn(&R) -> Option<f64>,
+) -> Column {
     let values = rows.iter().map(of).collect();
     column(name, Some(unit), ColumnValues::Numbers(values))
+}
+
+pub(super) fn texts<R>(name: &str, rows: &[R], of: impl Fn(&R) -> Option<String>) -> Column {
+    let values = rows.iter().map(of).collect();
+    column(name, None, ColumnValues::Texts(values))
 }
 
 fn counts<R>(name: &str, rows: &[R], of: impl Fn(&R) -> Option<u32>) -> Column {
@@ -102,7 +115,7 @@ fn counts<R>(name: &str, rows: &[R], of: impl Fn(&R) -> Option<u32>) -> Column {
 }
 
 /// What an answer says besides its rows, which were taken out of it.
-fn about<T: Serialize>(without_rows: &T, rows: &str) -> String {
+pub(super) fn about<T: Serialize>(without_rows: &T, rows: &str) -> String {
     let mut own = serde_json::to_value(without_rows).unwrap_or_default();
     if let Some(own) = own.as_object_mut() {
         own.remove(rows);

@@ -4,7 +4,9 @@ use std::collections::HashMap;
 use std::io::Write;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use arrow::array::{ArrayRef, BooleanArray, Float64Array, TimestampMillisecondArray, UInt32Array};
+use arrow::array::{
+    ArrayRef, BooleanArray, Float64Array, StringArray, TimestampMillisecondArray, UInt32Array,
+};
 use arrow::datatypes::{Field, Schema};
 use arrow::record_batch::RecordBatch;
 use contract::rows::{Column, ColumnValues, Columns};
@@ -64,6 +66,7 @@ fn array(column: &Column) -> (Field, ArrayRef) {
         ColumnValues::Numbers(own) => (Arc::new(Float64Array::from(own.clone())), true),
         ColumnValues::Counts(own) => (Arc::new(UInt32Array::from(own.clone())), true),
         ColumnValues::Flags(own) => (Arc::new(BooleanArray::from(own.clone())), false),
+        ColumnValues::Texts(own) => (Arc::new(StringArray::from(own.clone())), true),
     };
     let field = Field::new(&column.name, array.data_type().clone(), is_nullable);
     let unit = column
@@ -128,6 +131,11 @@ mod tests {
                     ColumnValues::SomeInstants(vec![None, Some(day(2))]),
                 ),
                 column("is_withheld", None, ColumnValues::Flags(vec![false, true])),
+                column(
+                    "region",
+                    None,
+                    ColumnValues::Texts(vec![None, Some("a, \"b\"".to_owned())]),
+                ),
             ],
         }
     }
@@ -157,14 +165,16 @@ mod tests {
         assert_eq!((found.is_null(0), found.value(1)), (true, 172_800_000));
         let flags = rows[0].column(4).as_boolean();
         assert_eq!((flags.value(0), flags.value(1)), (false, true));
+        let texts = rows[0].column(5).as_string::<i32>();
+        assert_eq!((texts.is_null(0), texts.value(1)), (true, "a, \"b\""));
     }
 
     #[test]
     fn the_same_is_a_line_a_row_in_csv() {
         let bytes = encoded(&columns(), AnswerFormat::Csv).unwrap();
-        let expected = "start,mean,steps,found,is_withheld\n\
-            1970-01-01T00:00:00Z,0.1,,,false\n\
-            1970-01-02T00:00:00Z,,7,1970-01-03T00:00:00Z,true\n";
+        let expected = "start,mean,steps,found,is_withheld,region\n\
+            1970-01-01T00:00:00Z,0.1,,,false,\n\
+            1970-01-02T00:00:00Z,,7,1970-01-03T00:00:00Z,true,\"a, \"\"b\"\"\"\n";
         assert_eq!(String::from_utf8(bytes).unwrap(), expected);
     }
 

@@ -10,8 +10,7 @@ use contract::analysis::{
 };
 use contract::earth::Earth;
 use contract::grid::LonLatDeg;
-use contract::manifest::ManifestId;
-use contract::product::ProductId;
+use contract::manifest::{AskedVersion, ManifestId};
 use contract::statistics::MinCoverage;
 use contract::time::{TimeMs, TimeStep};
 
@@ -95,7 +94,8 @@ impl Analysis {
 #[derive(Debug, Args)]
 #[group(required = true, multiple = false)]
 pub(crate) struct Place {
-    /// `global`, a named region, a box WEST,SOUTH,EAST,NORTH, a GeoJSON or WKT file, or the text of one.
+    /// `global`, a named region, a box WEST,SOUTH,EAST,NORTH, a GeoJSON or WKT file, the text of one, or MASK:CODE, the cells where a
+    /// landed mask has a code, or what it means: basins:5, basins:southern.
     #[arg(long, allow_hyphen_values = true)]
     pub(crate) region: Option<String>,
     /// The cell that holds a place, degrees east and north, in place of a region.
@@ -109,9 +109,9 @@ pub(crate) struct Place {
 /// `fluxglobe stats correlate`.
 #[derive(Debug, Args)]
 pub(crate) struct StatsCorrelate {
-    /// The two products, each with its own --product: the first and the second.
-    #[arg(long = "product", required = true, value_name = "PRODUCT")]
-    pub(crate) products: Vec<ProductId>,
+    /// The two products, each with its own --product: the first and the second; of each a version if one is given, such as NAME@12.
+    #[arg(long = "product", required = true, value_name = "PRODUCT[@VERSION]")]
+    pub(crate) products: Vec<AskedVersion>,
     #[command(flatten)]
     pub(crate) place: Place,
     /// Steps that one is moved against the other, at most 400; at lags above zero the first leads. None if absent.
@@ -140,22 +140,22 @@ pub(crate) struct StatsCorrelate {
 /// `fluxglobe stats difference`.
 #[derive(Debug, Args)]
 pub(crate) struct StatsDifference {
-    /// Product.
-    #[arg(long)]
-    pub(crate) product: ProductId,
+    /// Product, and which of its versions: NAME, NAME@12 or NAME@12-0a1b2c3d. The newest if none is given.
+    #[arg(long, value_name = "PRODUCT[@VERSION]")]
+    pub(crate) product: AskedVersion,
     /// Its years, both part of it: 2001/2005. All that it covers if absent.
     #[arg(long, value_name = "FIRST/LAST")]
     pub(crate) period: Option<BasePeriod>,
-    /// Its version, as answers name it. The newest if absent.
+    /// Its version, as answers name it, where --product names none. The newest if absent.
     #[arg(long, value_name = "VERSION")]
     pub(crate) manifest: Option<ManifestId>,
-    /// Product that is taken off. The same one if absent.
-    #[arg(long, value_name = "PRODUCT")]
-    pub(crate) minus: Option<ProductId>,
+    /// Product that is taken off, and which of its versions. The same product, in its newest version, if absent.
+    #[arg(long, value_name = "PRODUCT[@VERSION]")]
+    pub(crate) minus: Option<AskedVersion>,
     /// Years that are taken off. The same ones if absent.
     #[arg(long, value_name = "FIRST/LAST")]
     pub(crate) minus_period: Option<BasePeriod>,
-    /// Version that is taken off. The newest if absent.
+    /// Version that is taken off, where --minus names none. The newest if absent.
     #[arg(long, value_name = "VERSION")]
     pub(crate) minus_manifest: Option<ManifestId>,
     #[command(flatten)]
@@ -171,9 +171,9 @@ pub(crate) struct StatsDifference {
 /// `fluxglobe stats hovmoller`.
 #[derive(Debug, Args)]
 pub(crate) struct StatsHovmoller {
-    /// Product.
-    #[arg(long)]
-    pub(crate) product: ProductId,
+    /// Product, and which of its versions: NAME, NAME@12 or NAME@12-0a1b2c3d. The newest if none is given.
+    #[arg(long, value_name = "PRODUCT[@VERSION]")]
+    pub(crate) product: AskedVersion,
     /// What bands lie along: `lat`, means over longitude, or `lon`, means over latitude.
     #[arg(long, value_name = "lat|lon")]
     pub(crate) along: Along,

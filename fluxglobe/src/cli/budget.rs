@@ -3,6 +3,7 @@
 use clap::Args;
 use contract::budget::{AsOf, BudgetWords, ErrorWords};
 use contract::earth::Earth;
+use contract::manifest::AskedVersion;
 use contract::product::ProductId;
 use contract::region::Cells;
 use contract::time::{TimeMs, TimeStep};
@@ -17,11 +18,11 @@ const PARTS: &str = "Parts";
 /// `fluxglobe budget`.
 #[derive(Debug, Args)]
 pub(crate) struct Budget {
-    /// Product, a carbon flux.
-    #[arg(long)]
-    pub(crate) product: ProductId,
+    /// Product, a carbon flux, and which of its versions: NAME, NAME@12 or NAME@12-0a1b2c3d. The newest if none is given.
+    #[arg(long, value_name = "PRODUCT[@VERSION]")]
+    pub(crate) product: AskedVersion,
     /// `global`, a named region, a box WEST,SOUTH,EAST,NORTH, a GeoJSON or WKT file, the text of one,
-    /// or PRODUCT:CODE, the cells where a landed mask has a code.
+    /// or MASK:CODE, the cells where a landed mask has a code, or what it means: basins:5, basins:southern.
     #[arg(long, default_value = "global", allow_hyphen_values = true)]
     pub(crate) region: String,
     /// First instant: 2000, 2000-03, 2000-03-15 or with a time of day. The product's first if absent.
@@ -45,7 +46,7 @@ pub(crate) struct Budget {
     #[arg(long, value_name = "PRODUCT")]
     pub(crate) ocean: Option<ProductId>,
     /// The newest version that was published at an instant (a day is its first moment, UTC), or one as answers name it,
-    /// PRODUCT@NUMBER-DIGEST. The newest of all if absent.
+    /// PRODUCT@NUMBER-DIGEST, where --product names none. The newest of all if absent.
     #[arg(long, value_name = "DATE|VERSION")]
     pub(crate) as_of: Option<AsOf>,
     /// One line for each version of the product that changed the budget, with its date and what it changed.
@@ -80,6 +81,10 @@ pub(crate) struct Budget {
     /// names, as a file or as text, or a PRODUCT that is a mask, of which each code is a region.
     #[arg(long, value_name = "FILE|PRODUCT", help_heading = PARTS)]
     pub(crate) regions: Option<String>,
+    /// Comma-separated values instead of a table: a row a period (of several regions those of each, the whole last), with
+    /// --history a row a version.
+    #[arg(long, conflicts_with = "json")]
+    pub(crate) csv: bool,
     /// JSON instead of a table.
     #[arg(long)]
     pub(crate) json: bool,

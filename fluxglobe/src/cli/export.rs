@@ -1,9 +1,7 @@
 //! Words of `fluxglobe export`.
 
-use std::str::FromStr;
-
 use clap::{Args, ValueEnum};
-use contract::product::ProductId;
+use contract::manifest::AskedVersion;
 
 /// `fluxglobe export`.
 #[derive(Debug, Args)]
@@ -23,7 +21,7 @@ docs/open-data.md shows more.")]
 pub(crate) struct Export {
     /// Product, and which of its versions: NAME, NAME@12 or NAME@12-0a1b2c3d. The newest version if none is given.
     #[arg(value_name = "PRODUCT[@VERSION]")]
-    pub(crate) product: ExportedProduct,
+    pub(crate) product: AskedVersion,
     /// What to write: plain Zarr version 3, which is files, or an Icechunk repository, which keeps versions and is never
     /// seen half written; or, on this machine, NetCDF-4, a folder of GeoTIFFs, or a table in Parquet.
     #[arg(long, value_enum)]
@@ -61,68 +59,6 @@ impl ExportFormat {
             Self::Netcdf => "netcdf",
             Self::Geotiff => "geotiff",
             Self::Parquet => "parquet",
-        }
-    }
-}
-
-/// A product, and perhaps one of its versions.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct ExportedProduct {
-    pub(crate) product: ProductId,
-    /// The number of a version.
-    pub(crate) number: Option<u64>,
-    /// The digest that the version must have, eight digits, if one was given.
-    pub(crate) digest: Option<String>,
-}
-
-impl FromStr for ExportedProduct {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let (product, version) = match text.split_once('@') {
-            Some((product, version)) => (product, Some(version)),
-            None => (text, None),
-        };
-        let product = product.parse().map_err(|e| format!("{e}"))?;
-        let Some(version) = version else {
-            return Ok(Self {
-                product,
-                number: None,
-                digest: None,
-            });
-        };
-        let (number, digest) = match version.split_once('-') {
-            Some((number, digest)) => (number, Some(digest.to_owned())),
-            None => (version, None),
-        };
-        let number = number.parse().map_err(|_not_a_number| {
-            format!("{version:?} is no version: give NAME@12 or NAME@12-0a1b2c3d")
-        })?;
-        Ok(Self {
-            product,
-            number: Some(number),
-            digest,
-        })
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_version_is_a_number_with_or_without_its_digest() {
-        let parse = |text: &str| text.parse::<ExportedProduct>();
-        let of = |number, digest: Option<&str>| ExportedProduct {
-            product: "p".parse().unwrap(),
-            number,
-            digest: digest.map(str::to_owned),
-        };
-        assert_eq!(parse("p"), Ok(of(None, None)));
-        assert_eq!(parse("p@12"), Ok(of(Some(12), None)));
-        assert_eq!(parse("p@12-0a1b2c3d"), Ok(of(Some(12), Some("0a1b2c3d"))));
-        for wrong in ["P", "p@", "p@x", "@1", "p@-1"] {
-            assert!(parse(wrong).is_err(), "{wrong}");
         }
     }
 }

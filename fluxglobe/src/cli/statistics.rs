@@ -3,6 +3,7 @@
 use clap::{Args, Subcommand};
 use contract::earth::Earth;
 use contract::geometry::Sampling;
+use contract::manifest::AskedVersion;
 use contract::product::ProductId;
 use contract::region::Cells;
 use contract::statistics::{MinCoverage, Statistics, StatisticsWishes};
@@ -63,9 +64,9 @@ impl StatisticsOptions {
 /// `fluxglobe stats point`.
 #[derive(Debug, Args)]
 pub(crate) struct StatsPoint {
-    /// Product.
-    #[arg(long)]
-    pub(crate) product: ProductId,
+    /// Product, and which of its versions: NAME, NAME@12 or NAME@12-0a1b2c3d. The newest if none is given.
+    #[arg(long, value_name = "PRODUCT[@VERSION]")]
+    pub(crate) product: AskedVersion,
     /// Longitude, degrees east.
     #[arg(long, allow_negative_numbers = true)]
     pub(crate) lon: f64,
@@ -93,9 +94,9 @@ pub(crate) struct StatsPoint {
 /// `fluxglobe stats line`.
 #[derive(Debug, Args)]
 pub(crate) struct StatsLine {
-    /// Product, of any quantity.
-    #[arg(long)]
-    pub(crate) product: ProductId,
+    /// Product, of any quantity, and which of its versions: NAME, NAME@12 or NAME@12-0a1b2c3d. The newest if none is given.
+    #[arg(long, value_name = "PRODUCT[@VERSION]")]
+    pub(crate) product: AskedVersion,
     /// `LON,LAT;LON,LAT;...`, a GeoJSON or WKT file with lines, or the text of one. Between two vertices it is a great circle.
     #[arg(long, allow_hyphen_values = true)]
     pub(crate) line: String,
@@ -120,11 +121,11 @@ pub(crate) struct StatsLine {
 /// `fluxglobe stats polygon`.
 #[derive(Debug, Args)]
 pub(crate) struct StatsPolygon {
-    /// Product, of any quantity.
-    #[arg(long)]
-    pub(crate) product: ProductId,
+    /// Product, of any quantity, and which of its versions: NAME, NAME@12 or NAME@12-0a1b2c3d. The newest if none is given.
+    #[arg(long, value_name = "PRODUCT[@VERSION]")]
+    pub(crate) product: AskedVersion,
     /// `global`, a named region, a box WEST,SOUTH,EAST,NORTH, a GeoJSON or WKT file, the text of one,
-    /// or PRODUCT:CODE, the cells where a landed mask has a code.
+    /// or MASK:CODE, the cells where a landed mask has a code, or what it means: basins:5, basins:southern.
     #[arg(long, allow_hyphen_values = true)]
     pub(crate) region: String,
     /// First instant: 2000, 2000-03, 2000-03-15 or with a time of day. The product's first if absent.

@@ -8,8 +8,7 @@ use anyhow::{Result, bail};
 use compute::Engine;
 use contract::analysis::{AnalysisOptions, Hovmoller, HovmollerWishes, SeriesQuery};
 use contract::cited::Cited;
-use contract::manifest::Manifest;
-use contract::product::ProductId;
+use contract::manifest::{AskedVersion, Manifest, ManifestId};
 use storage::Store;
 
 use crate::cli::{PlotFile, Settings, StatsHovmoller};
@@ -23,18 +22,17 @@ pub(crate) struct Output<'a> {
     pub(crate) plot: Option<&'a PlotFile>,
 }
 
-/// Analyses a series of the newest version of a product.
+/// Analyses a series of a version of a product.
 pub(crate) async fn of_series(
     settings: &Settings,
-    store: Store,
+    (store, manifest): (Store, &Manifest),
     query: &SeriesQuery,
     options: &AnalysisOptions,
     output: Output<'_>,
 ) -> Result<()> {
-    let manifest = deployment::manifest(&store, query.product(), &settings.data).await?;
     let bar = progress::bar("analyse the series", 1);
     let engine = reader(settings, store, query)?;
-    let version = (&manifest, &manifest.id());
+    let version = (manifest, &manifest.id());
     let answer = compute::analysis::analyse(&engine, version, query, options).await?;
     bar.finish_and_clear();
     if let Some(file) = output.plot {
@@ -70,7 +68,7 @@ pub(crate) async fn of_series(
 /// Latitude or longitude against time.
 pub(crate) async fn hovmoller(settings: &Settings, options: &StatsHovmoller) -> Result<()> {
     let store = deployment::store(settings)?;
-    let manifest = deployment::manifest(&store, &options.product, &settings.data).await?;
+    let manifest = deployment::version(&store, &options.product, &settings.data).await?;
     let wishes = HovmollerWishes {
         band_deg: options.band,
         region: options.region.as_deref().map(str::parse).transpose()?,
@@ -79,7 +77,7 @@ pub(crate) async fn hovmoller(settings: &Settings, options: &StatsHovmoller) -> 
         to: options.to,
         earth: Some(options.earth),
     };
-    let query = wishes.query(options.product.clone(), options.along)?;
+    let query = wishes.query(manifest.product.clone(), options.along)?;
     let bar = progress::bar("means of bands", 1);
     let version = (&manifest, &manifest.id());
     let answer: Hovmoller = compute::analysis::hovmoller(&store, version, &query).await?;
@@ -110,25 +108,29 @@ fn reader(settings: &Settings, store: Store, query: &SeriesQuery) -> Result<Engi
 }
 
 fn say_source(cited: &Cited, what: &str, more: &str) {
-    let quantity = cited.quantity.title();
-    let unit = if cited.unit.is_empty() { "" } else { " in " };
     progress::say(&format!(
-        "{quantity}{unit}{}, {what}; {more}; cite {}",
-        cited.unit, cited.manifest
+        "{}, {what}; {more}; cite {}",
+        cited.titled(),
+        cited.manifest
     ));
     progress::say(&cited.source);
 }
 
-/// A version by its name, or the newest of a product.
+/// A version of a product, which another option may name.
 async fn version(
     settings: &Settings,
     store: &Store,
-    product: &ProductId,
-    named: Option<&contract::manifest::ManifestId>,
+    asked: &AskedVersion,
+    named: Option<&ManifestId>,
 ) -> Result<Manifest> {
     match named {
-        None => deployment::manifest(store, product, &settings.data).await,
-        Some(id) if id.product != *product => bail!("version {id} is none of {product}"),
+        None => deployment::version(store, asked, &settings.data).await,
+        Some(id) if asked.number.is_some() => {
+            bail!("{asked} and {id} both say which version is meant: give one")
+        }
+        Some(id) if id.product != asked.product => {
+            bail!("version {id} is none of {}", asked.product)
+        }
         Some(id) => Ok(storage::manifests::load(store, id).await?),
     }
 }

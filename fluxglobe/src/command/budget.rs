@@ -9,13 +9,14 @@ use std::sync::Arc;
 use anyhow::{Result, bail};
 use compute::region::{file, mask};
 use contract::budget::{AsOf, BudgetAnswer, BudgetHistory, BudgetQuery, BudgetRow, BudgetWishes};
-use contract::manifest::Manifest;
+use contract::manifest::{AskedVersion, Manifest};
 use contract::product::ProductId;
 use contract::quantity::Quantity;
-use contract::region::AskedRegion;
+use contract::region::{AskedRegion, MaskCode};
 use storage::Store;
 use storage::manifests::{self, AtInstant};
 
+use super::statistics::{Form, csv};
 use crate::cli::{Budget, Settings};
 use crate::{deployment, progress};
 
@@ -25,19 +26,21 @@ pub(crate) async fn run(settings: &Settings, options: &Budget) -> Result<()> {
     let store = deployment::store(settings)?;
     let product = version(settings, &store, options).await?;
     let query = query(settings, &store, options).await?;
+    let form = Form::of(options.csv, options.json);
     let bar = progress::bar("sum over the region", 1);
     let engine = deployment::region_engine(settings, store)?;
     if options.history {
         let answer = compute::budget::history(&engine, &query).await?;
         bar.finish_and_clear();
-        return say_history(options, &answer);
+        return say_history(form, &answer);
     }
     let answer = compute::budget::budget_of(&engine, &query, &product).await?;
     bar.finish_and_clear();
-    if options.json {
-        return progress::result(&serde_json::to_string_pretty(&answer)?);
+    match form {
+        Form::Json => return progress::result(&serde_json::to_string_pretty(&answer)?),
+        Form::Csv => progress::result(&csv(&answer)?)?,
+        Form::Table => progress::result(&tables::of(&answer).to_string())?,
     }
-    progress::result(&tables::of(&answer).to_string())?;
     say_what(&answer);
     say_besides(&answer);
     let is_counted = |row: &BudgetRow| row.completeness.is_some();
@@ -52,10 +55,20 @@ pub(crate) async fn run(settings: &Settings, options: &Budget) -> Result<()> {
 
 /// The version that is asked for.
 async fn version(settings: &Settings, store: &Store, options: &Budget) -> Result<Manifest> {
-    let product = &options.product;
-    let newest = deployment::manifest(store, product, &settings.data).await?;
+    let asked = &options.product;
+    let own = deployment::version(store, asked, &settings.data).await?;
+    if asked.number.is_some() && options.history {
+        bail!(
+            "a history is of all versions: give --product {} alone",
+            asked.product
+        );
+    }
+    let product = &asked.product;
     match &options.as_of {
-        None => Ok(newest),
+        None => Ok(own),
+        Some(_) if asked.number.is_some() => {
+            bail!("--product {asked} and --as-of both say which version is meant: give one")
+        }
         Some(AsOf::Version(id)) if id.product != *product => {
             bail!("version {id} is none of {product}")
         }
@@ -90,7 +103,7 @@ async fn query(settings: &Settings, store: &Store, options: &Budget) -> Result<B
         cells: Some(options.cells),
         ocean: ocean(settings, store, options.ocean.as_ref()).await?,
     };
-    Ok(besides.of(wishes.query(options.product.clone()), &versions)?)
+    Ok(besides.of(wishes.query(options.product.product.clone()), &versions)?)
 }
 
 fn say_what(answer: &BudgetAnswer) {
@@ -163,11 +176,12 @@ fn say_besides(answer: &BudgetAnswer) {
     }
 }
 
-fn say_history(options: &Budget, answer: &BudgetHistory) -> Result<()> {
-    if options.json {
-        return progress::result(&serde_json::to_string_pretty(answer)?);
+fn say_history(form: Form, answer: &BudgetHistory) -> Result<()> {
+    match form {
+        Form::Json => return progress::result(&serde_json::to_string_pretty(answer)?),
+        Form::Csv => progress::result(&csv(answer)?)?,
+        Form::Table => progress::result(&tables::of_history(answer).to_string())?,
     }
-    progress::result(&tables::of_history(answer).to_string())?;
     progress::say(&format!(
         "{} of {}, positive out of the sea, by the {} of {} versions that changed it",
         answer.unit,
@@ -194,17 +208,19 @@ pub(crate) async fn ocean(
     Ok(Some(Arc::new(manifest)))
 }
 
-/// As [`region`], or the cells of a landed mask that have a code: `PRODUCT:CODE`.
+/// As [`region`], or the cells of a landed mask that have a code, or what it means: `MASK:CODE`, the mask perhaps in one of its versions.
 pub(crate) async fn stored_region(
     settings: &Settings,
     store: &Store,
     text: &str,
 ) -> Result<AskedRegion> {
-    let Some((product, code)) = mask::asked(text) else {
+    let of_mask = MaskCode::split(text).filter(|_| !file::is_file_name(text));
+    let of_mask = of_mask.and_then(|(mask, code)| Some((mask.parse::<AskedVersion>().ok()?, code)));
+    let Some((mask, code)) = of_mask else {
         return region(text);
     };
-    let mask = deployment::manifest(store, &product, &settings.data).await?;
-    Ok(mask::region(store, &mask, code).await?)
+    let mask = deployment::version(store, &mask, &settings.data).await?;
+    Ok(mask::region(store, &mask, &code).await?)
 }
 
 /// A region file, a named region, a box, GeoJSON text or well-known text.

@@ -14,7 +14,7 @@ use serde::Serialize;
 use storage::{Store, fields};
 use tokio::sync::mpsc;
 
-use crate::cli::{Export, ExportFormat, ExportedProduct, Settings};
+use crate::cli::{Export, ExportFormat, Settings};
 use crate::{deployment, progress};
 
 /// What was written.
@@ -33,7 +33,7 @@ struct Exported {
 
 pub(crate) async fn run(settings: &Settings, options: &Export) -> Result<()> {
     let store = deployment::store(settings)?;
-    let manifest = version(&store, &options.product, settings).await?;
+    let manifest = deployment::version(&store, &options.product, &settings.data).await?;
     let bar = progress::bar("export", manifest.steps.len() as u64);
     let (url, tag) = if let Some(format) = file_format(options.to) {
         let path = local(&options.destination)?;
@@ -241,32 +241,6 @@ fn summary(exported: &Exported) -> String {
         exported.format,
         exported.destination
     )
-}
-
-/// The version that was asked for.
-async fn version(store: &Store, asked: &ExportedProduct, settings: &Settings) -> Result<Manifest> {
-    let ExportedProduct {
-        product,
-        number,
-        digest,
-    } = asked;
-    let newest = deployment::manifest(store, product, &settings.data).await?;
-    let Some(number) = *number else {
-        return Ok(newest);
-    };
-    let Some(manifest) = storage::manifests::numbered(store, product, number).await? else {
-        bail!(
-            "{product} has no version {number} (any more); its newest is {}",
-            newest.id()
-        );
-    };
-    let id = manifest.id().to_string();
-    if let Some(digest) = digest
-        && !id.ends_with(&format!("-{digest}"))
-    {
-        bail!("version {number} of {product} is {id}, not {product}@{number}-{digest}");
-    }
-    Ok(manifest)
 }
 
 /// Opens the place to write to, and makes sure that it is empty.

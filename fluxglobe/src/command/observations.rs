@@ -170,10 +170,14 @@ async fn matchup(settings: &Settings, options: &Matchup) -> Result<()> {
     }
     progress::result(&format!("{:#?}", matched.statistics))?;
     progress::say(&format!(
-        "{} of {} observations in {}; left out: {:?}; against {}",
+        "{} of {} observations{}; left out: {:?}; against {}",
         matched.rows.len(),
         rows.len(),
-        matched.unit,
+        if matched.unit.is_empty() {
+            String::new()
+        } else {
+            format!(" in {}", matched.unit)
+        },
         matched.left_out,
         manifest.id()
     ));

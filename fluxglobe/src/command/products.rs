@@ -9,6 +9,9 @@ use contract::time::TimeMs;
 use crate::cli::{Products, Settings};
 use crate::{deployment, progress};
 
+/// Codes of a mask that are shown on a line.
+const CODES_SHOWN: usize = 20;
+
 /// Warnings about a product; none if nothing was masked.
 fn warnings(row: &ListedProduct) -> Vec<String> {
     let (product, steps, masked) = (&row.product, row.step_count, &row.masked);
@@ -32,6 +35,22 @@ fn warnings(row: &ListedProduct) -> Vec<String> {
     lines
 }
 
+/// What the codes of a mask mean; none of what has no codes.
+fn codes(row: &ListedProduct) -> Option<String> {
+    let flags = row.quantity.flags();
+    let shown: Vec<String> = flags
+        .iter()
+        .take(CODES_SHOWN)
+        .map(|flag| format!("{} {}", flag.value, flag.meaning))
+        .collect();
+    let more = match flags.len() - shown.len() {
+        0 => String::new(),
+        more => format!(", and {more} more, which --json has"),
+    };
+    let shown = shown.join(", ");
+    (!flags.is_empty()).then(|| format!("{}: codes {shown}{more}", row.product))
+}
+
 pub(crate) async fn run(settings: &Settings, options: &Products) -> Result<()> {
     let store = deployment::store(settings)?;
     let mut rows = vec![];
@@ -53,9 +72,10 @@ pub(crate) async fn run(settings: &Settings, options: &Products) -> Result<()> {
     table.set_header([
         "product", "title", "cells", "steps", "from", "to", "manifest",
     ]);
-    let mut masked = vec![];
+    let mut besides = vec![];
     for row in rows {
-        masked.extend(warnings(&row));
+        besides.extend(codes(&row));
+        besides.extend(warnings(&row));
         let day = |time: Option<TimeMs>| time.map_or(String::new(), progress::day);
         // Titles of made-up data mostly say so themselves.
         let says = row.title.to_lowercase().contains("synthetic");
@@ -75,7 +95,7 @@ pub(crate) async fn run(settings: &Settings, options: &Products) -> Result<()> {
         ]);
     }
     progress::result(&table.to_string())?;
-    for line in &masked {
+    for line in &besides {
         progress::say(line);
     }
     Ok(())

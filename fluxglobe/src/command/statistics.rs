@@ -3,12 +3,14 @@
 use anyhow::Result;
 use comfy_table::presets::NOTHING;
 use comfy_table::{CellAlignment, Table};
-use compute::reduce::statistics;
-use contract::rows::Tabular as _;
+use compute::reduce::statistics_of;
+use contract::manifest::Manifest;
+use contract::rows::Tabular;
 use contract::statistics::{StatisticsAnswer, StatisticsQuery, StatisticsRow};
 use export::answer::AnswerFormat;
+use storage::Store;
 
-use crate::cli::{PlotFile, Settings, StatisticsOptions};
+use crate::cli::{PlotFile, Settings};
 use crate::{deployment, plot, progress};
 
 /// How an answer is printed.
@@ -20,8 +22,8 @@ pub(crate) enum Form {
 }
 
 impl Form {
-    pub(crate) fn of(options: &StatisticsOptions, is_json: bool) -> Self {
-        match (is_json, options.csv) {
+    pub(crate) fn of(is_csv: bool, is_json: bool) -> Self {
+        match (is_json, is_csv) {
             (true, _) => Self::Json,
             (false, true) => Self::Csv,
             (false, false) => Self::Table,
@@ -32,28 +34,26 @@ impl Form {
 /// Asks, draws and prints.
 pub(crate) async fn run(
     settings: &Settings,
+    (store, manifest): (Store, &Manifest),
     query: &StatisticsQuery,
     form: Form,
     plot: Option<&PlotFile>,
 ) -> Result<()> {
-    let store = deployment::store(settings)?;
-    deployment::manifest(&store, &query.product, &settings.data).await?;
     let engine = deployment::region_engine(settings, store)?;
     let bar = progress::bar("statistics", 1);
-    let answer = statistics(&engine, query).await?;
+    let answer = statistics_of(&engine, query, manifest, manifest.id()).await?;
     bar.finish_and_clear();
     if let Some(file) = plot {
         plot::write(file, &plot::of_statistics(&answer)?)?;
     }
     match form {
         Form::Json => return progress::result(&serde_json::to_string_pretty(&answer)?),
-        Form::Csv => progress::result(csv(&answer)?.trim_end())?,
+        Form::Csv => progress::result(&csv(&answer)?)?,
         Form::Table => progress::result(&table(&answer).to_string())?,
     }
     progress::say(&format!(
-        "{} in {}, {} of {} ({:.6e} {}) on the {} earth; cite {}",
-        answer.cited.quantity.title(),
-        answer.cited.unit,
+        "{}, {} of {} ({:.6e} {}) on the {} earth; cite {}",
+        answer.cited.titled(),
         answer.kind,
         answer.geometry,
         answer.size,
@@ -62,7 +62,11 @@ pub(crate) async fn run(
         answer.cited.manifest
     ));
     for one in &answer.statistics {
-        progress::say(&format!("{} ({}): {}", one.name, one.unit, one.what));
+        let unit = match one.unit.as_str() {
+            "" => String::new(),
+            unit => format!(" ({unit})"),
+        };
+        progress::say(&format!("{}{unit}: {}", one.name, one.what));
     }
     progress::say(&format!("coverage: {}", answer.coverage_basis));
     if let Some(source) = &answer.ocean_source {
@@ -128,7 +132,9 @@ fn shown(row: &StatisticsRow, name: &str) -> String {
 }
 
 /// A line a row; a value that is not there is empty. The same over HTTP.
-fn csv(answer: &StatisticsAnswer) -> Result<String> {
+pub(crate) fn csv(answer: &dyn Tabular) -> Result<String> {
     let content = export::answer::encoded(&answer.columns(), AnswerFormat::Csv)?;
-    Ok(String::from_utf8(content)?)
+    let mut text = String::from_utf8(content)?;
+    text.truncate(text.trim_end().len());
+    Ok(text)
 }

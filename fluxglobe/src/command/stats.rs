@@ -5,7 +5,8 @@ use anyhow::{Result, bail};
 use comfy_table::presets::NOTHING;
 use comfy_table::{CellAlignment, Table};
 use compute::Engine;
-use compute::stats::region_series;
+use compute::point::point_series_of;
+use compute::stats::region_series_of;
 use contract::analysis::{SeriesQuery, SeriesWishes};
 use contract::grid::LonLatDeg;
 use contract::series::{PointSeries, RegionSeries};
@@ -37,6 +38,9 @@ pub(crate) async fn run(settings: &Settings, which: Stats) -> Result<()> {
 
 async fn point(settings: &Settings, options: &StatsPoint) -> Result<()> {
     let place = LonLatDeg::new(options.lon, options.lat)?;
+    let store = deployment::store(settings)?;
+    let manifest = deployment::version(&store, &options.product, &settings.data).await?;
+    let product = &manifest.product;
     let output = Output {
         json: options.json,
         plot: options.analysis.plot.as_ref(),
@@ -54,7 +58,7 @@ async fn point(settings: &Settings, options: &StatsPoint) -> Result<()> {
             min_coverage: None,
             ..wishes
         };
-        let point = whole.at_point(options.product.clone(), place);
+        let point = whole.at_point(product.clone(), place);
         alone(matches!(point, PointQuestion::Series(_)))?;
         let wishes = SeriesWishes {
             place: Some(place),
@@ -62,21 +66,20 @@ async fn point(settings: &Settings, options: &StatsPoint) -> Result<()> {
             to: options.to,
             ..SeriesWishes::default()
         };
-        let store = deployment::store(settings)?;
-        let query = analysis::series(wishes, &options.product)?;
-        return analysis::of_series(settings, store, &query, &analysed, output).await;
+        let query = analysis::series(wishes, product)?;
+        let version = (store, &manifest);
+        return analysis::of_series(settings, version, &query, &analysed, output).await;
     }
-    let place = match wishes.at_point(options.product.clone(), place) {
+    let place = match wishes.at_point(product.clone(), place) {
         PointQuestion::Statistics(query) => {
-            let form = Form::of(&options.statistics, options.json);
-            return statistics::run(settings, &query, form, output.plot).await;
+            let form = Form::of(options.statistics.csv, options.json);
+            let version = (store, &manifest);
+            return statistics::run(settings, version, &query, form, output.plot).await;
         }
         PointQuestion::Series(place) => place,
     };
-    let store = deployment::store(settings)?;
-    deployment::manifest(&store, &options.product, &settings.data).await?;
-    let answer =
-        compute::point::point_series(&Engine::local(store), &options.product, place).await?;
+    let engine = Engine::local(store);
+    let answer = point_series_of(&engine, &manifest, manifest.id(), place).await?;
     if let Some(file) = output.plot {
         plot::write(file, &plot::of_point(&answer)?)?;
     }
@@ -85,9 +88,8 @@ async fn point(settings: &Settings, options: &StatsPoint) -> Result<()> {
     }
     progress::result(&table(&answer).to_string())?;
     progress::say(&format!(
-        "{} in {}, mean of the cell around {:.4}, {:.4}; cite {}",
-        answer.cited.quantity.title(),
-        answer.cited.unit,
+        "{}, mean of the cell around {:.4}, {:.4}; cite {}",
+        answer.cited.titled(),
         answer.cell.lon_deg,
         answer.cell.lat_deg,
         answer.cited.manifest
@@ -98,6 +100,9 @@ async fn point(settings: &Settings, options: &StatsPoint) -> Result<()> {
 
 async fn line(settings: &Settings, options: &StatsLine) -> Result<()> {
     let line = geometry::line(&options.line)?;
+    let store = deployment::store(settings)?;
+    let manifest = deployment::version(&store, &options.product, &settings.data).await?;
+    let version = (store, &manifest);
     let output = Output {
         json: options.json,
         plot: options.analysis.plot.as_ref(),
@@ -112,9 +117,8 @@ async fn line(settings: &Settings, options: &StatsLine) -> Result<()> {
             earth: Some(options.earth),
             ..SeriesWishes::default()
         };
-        let store = deployment::store(settings)?;
-        let query = analysis::series(wishes, &options.product)?;
-        return analysis::of_series(settings, store, &query, &analysed, output).await;
+        let query = analysis::series(wishes, &manifest.product)?;
+        return analysis::of_series(settings, version, &query, &analysed, output).await;
     }
     let wishes = StatisticsWishes {
         from: options.from,
@@ -122,13 +126,14 @@ async fn line(settings: &Settings, options: &StatsLine) -> Result<()> {
         earth: Some(options.earth),
         ..asked.wishes()
     };
-    let query = wishes.query(options.product.clone(), line.into());
-    let form = Form::of(asked, options.json);
-    statistics::run(settings, &query, form, output.plot).await
+    let query = wishes.query(manifest.product.clone(), line.into());
+    let form = Form::of(asked.csv, options.json);
+    statistics::run(settings, version, &query, form, output.plot).await
 }
 
 async fn polygon(settings: &Settings, options: &StatsPolygon) -> Result<()> {
     let store = deployment::store(settings)?;
+    let manifest = deployment::version(&store, &options.product, &settings.data).await?;
     let output = Output {
         json: options.json,
         plot: options.analysis.plot.as_ref(),
@@ -149,25 +154,25 @@ async fn polygon(settings: &Settings, options: &StatsPolygon) -> Result<()> {
         min_coverage,
         ..wishes
     };
-    let asked = wishes.over_region(options.product.clone(), region);
+    let asked = wishes.over_region(manifest.product.clone(), region);
     let query = match (analysed, asked) {
         (Some(analysed), asked) => {
             let RegionQuestion::Series(query) = asked else {
                 return alone(false);
             };
-            let query = SeriesQuery::Region(query);
-            return analysis::of_series(settings, store, &query, &analysed, output).await;
+            let (query, version) = (SeriesQuery::Region(query), (store, &manifest));
+            return analysis::of_series(settings, version, &query, &analysed, output).await;
         }
         (None, RegionQuestion::Statistics(query)) => {
-            let form = Form::of(&options.statistics, options.json);
-            return statistics::run(settings, &query, form, output.plot).await;
+            let form = Form::of(options.statistics.csv, options.json);
+            let version = (store, &manifest);
+            return statistics::run(settings, version, &query, form, output.plot).await;
         }
         (None, RegionQuestion::Series(query)) => query,
     };
-    deployment::manifest(&store, &options.product, &settings.data).await?;
     let bar = progress::bar("mean over the region", 1);
     let engine = deployment::region_engine(settings, store)?;
-    let answer = region_series(&engine, &query).await?;
+    let answer = region_series_of(&engine, &query, &manifest).await?;
     bar.finish_and_clear();
     if let Some(file) = output.plot {
         plot::write(file, &plot::of_region(&answer)?)?;
@@ -177,9 +182,8 @@ async fn polygon(settings: &Settings, options: &StatsPolygon) -> Result<()> {
     }
     progress::result(&region_table(&answer).to_string())?;
     progress::say(&format!(
-        "{} in {}, mean over {} ({:.3} 10⁶ km²), each cell by its area on the {} earth; cite {}",
-        answer.cited.quantity.title(),
-        answer.cited.unit,
+        "{}, mean over {} ({:.3} 10⁶ km²), each cell by its area on the {} earth; cite {}",
+        answer.cited.titled(),
         answer.region,
         answer.region_area_m2 / M2_PER_MILLION_KM2,
         answer.earth,

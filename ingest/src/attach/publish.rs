@@ -167,13 +167,14 @@ async fn next_version(
         let (mut grid, mut quantity) = (next.grid, next.quantity);
         if let Some(newest) = &newest {
             check_fits(newest, next.grid, (next.quantity, next.synthetic))?;
-            if newest.steps == steps {
+            let joined = newest.quantity.joined(quantity).unwrap_or(quantity);
+            if newest.steps == steps && joined.flags() == newest.quantity.flags() {
                 return Ok((newest.clone(), false));
             }
             grid = newest.grid;
             // Of what was not read only the version before knows the range.
             if domain.is_none() {
-                quantity = newest.quantity.joined(quantity).unwrap_or(quantity);
+                quantity = joined;
             }
         }
         let domain = match domain {

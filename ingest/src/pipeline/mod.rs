@@ -249,19 +249,18 @@ impl Pipeline<'_> {
 }
 
 /// Is this very file in the product, or are files of later notices in all of its places? With a profile of the caller's
-/// own it is decoded all the same, since the same bytes may mean other values by it.
+/// own it is decoded all the same, since the same bytes may mean other values by it; so is one whose codes mean what the product
+/// does not say.
 fn unchanged(
     newest: &Manifest,
     planned: &PlannedGranule,
     wish: Wish<'_>,
     place: NoticeOrder,
 ) -> Option<(Versioned, Unchanged)> {
+    let joined = newest.quantity.joined(planned.plan.target.quantity);
     if wish.profile.is_some()
         || planned.plan.steps.is_empty()
-        || newest
-            .quantity
-            .joined(planned.plan.target.quantity)
-            .is_none()
+        || joined.is_none_or(|joined| joined.flags() != newest.quantity.flags())
         || newest.grid != planned.plan.mapping.grid
     {
         return None;

@@ -6,6 +6,7 @@ mod bounds;
 pub(crate) mod cf;
 mod coverage;
 mod date;
+mod flags;
 mod place;
 pub(crate) mod profile;
 mod quality;
@@ -162,6 +163,8 @@ pub(crate) async fn plan(
         .assumption
         .iter()
         .for_each(|text| planning.assume(text));
+    let quantity = flags::told(&mut planning, variable, target.quantity, (&packing, &steps));
+    let target = Target { quantity, ..target };
     let quality = quality::plan(&mut planning, variable, &axes)?;
     let Planning {
         values,

@@ -279,6 +279,73 @@ async fn a_mask_needs_no_time_and_codes_stay_what_they_are() {
     assert!(said.contains("nothing says what it covers"), "{said}");
 }
 
+/// A mask of three codes, without a word of what they mean.
+fn basins() -> Made {
+    let codes = (0..32).map(|cell| (cell % 3) as i8).collect();
+    Made::new("basin", &["lat", "lon"], Values::Bytes(codes)).says("_FillValue", Says::Bytes(&[0]))
+}
+
+fn told(mask: Made) -> Made {
+    mask.says("flag_values", Says::Bytes(&[0, 1, 2]))
+        .text("flag_meanings", "none atlantic indian")
+}
+
+#[tokio::test]
+async fn what_codes_mean_is_kept_and_a_file_that_says_it_later_is_taken_for_it() {
+    let place = Place::new();
+    let outcome = land(&place, &MadeFile::days(1).with(basins())).await;
+    assert!(!outcome.is_rejected(), "{outcome}");
+    assert!(place.newest("a").await.quantity.flags().is_empty());
+    let file = MadeFile::days(1).with(told(basins()));
+    for is_new in [true, false] {
+        let outcome = land(&place, &file).await;
+        assert_eq!(
+            matches!(outcome, Outcome::Landed { revised: true, .. }),
+            is_new,
+            "{outcome}"
+        );
+        let manifest = place.newest("a").await;
+        // The fill value is no code.
+        let flags = manifest.quantity.flags().iter();
+        let flags: Vec<_> = flags.map(|own| (own.value, own.meaning.as_str())).collect();
+        assert_eq!(flags, [(1, "atlantic"), (2, "indian")]);
+        assert_eq!((manifest.number, manifest.steps.len()), (2, 1));
+    }
+}
+
+#[tokio::test]
+async fn meanings_that_cannot_be_kept_are_left_out_and_that_is_said() {
+    for (file, wanted) in [
+        (
+            told(basins()).text("flag_meanings", "none atlantic"),
+            "3 flag_values for 2 words",
+        ),
+        (
+            told(basins()).text("flag_meanings", "none a a"),
+            "two codes mean",
+        ),
+        (
+            told(basins()).text("flag_meanings", "none \u{1b}[2J b"),
+            "no meaning",
+        ),
+        (
+            told(basins()).says("flag_masks", Says::Bytes(&[1, 1, 1])),
+            "of bits",
+        ),
+    ] {
+        let place = Place::new();
+        let outcome = land(&place, &MadeFile::days(1).with(file)).await;
+        assert!(!outcome.is_rejected(), "{outcome}");
+        let line = outcome.to_string();
+        assert!(
+            line.contains("what its codes mean is left out") && line.contains(wanted),
+            "{line}"
+        );
+        assert!(!line.chars().any(char::is_control), "{line:?}");
+        assert!(place.newest("a").await.quantity.flags().is_empty());
+    }
+}
+
 #[tokio::test]
 async fn what_cannot_be_right_is_refused_with_its_reason() {
     let direction = variable("dir", 2)

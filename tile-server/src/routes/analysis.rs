@@ -19,6 +19,7 @@ use crate::bodies::Room;
 use crate::catalogue::Layer;
 use crate::error::ServerError;
 use crate::extract::{UrlPath, UrlQuery, left_out, number, parsed, time};
+use crate::masks;
 use crate::openapi::words::GeoJson;
 use crate::routes::budget::ocean;
 use crate::state::AppState;
@@ -47,7 +48,8 @@ pub(crate) struct AnalysisParameters {
     /// Latitude of a cell, degrees north.
     #[param(value_type = Option<f64>, minimum = -90, maximum = 90)]
     lat: Option<String>,
-    /// `global`, a name that `/api/regions` lists, `west,south,east,north` in degrees, GeoJSON or well-known text.
+    /// `global`, a name that `/api/regions` lists, `west,south,east,north` in degrees, GeoJSON or well-known text, or `MASK:CODE`: the
+    /// cells where a landed mask has a code, or what it means, such as `basins:5` or `basins:southern`.
     region: Option<String>,
     /// `LON,LAT;LON,LAT;...` in degrees, GeoJSON or well-known text, in place of a region: the mean along a line, each cell by the length
     /// in it.
@@ -61,7 +63,7 @@ pub(crate) struct AnalysisParameters {
     earth: Option<String>,
     /// Landed product whose cells say how much of them is sea or land, in place of Natural Earth.
     ocean: Option<String>,
-    /// Version, as answers name it; the newest unless one is given.
+    /// Version, as answers name it, with or without its digest; the newest unless one is given.
     manifest: Option<String>,
 }
 
@@ -102,13 +104,7 @@ pub(crate) async fn post(
     UrlQuery(asked): UrlQuery<AnalysisParameters>,
     body: Body,
 ) -> Result<Response, ServerError> {
-    left_out(&[
-        ("region", asked.region.is_some()),
-        ("line", asked.line.is_some()),
-        ("lon", asked.lon.is_some()),
-        ("lat", asked.lat.is_some()),
-    ])?;
-    let (sent, _room) = SentPlace::take(&state, &headers, body).await?;
+    let (sent, _room) = SentPlace::take(&state, &asked.place(), &headers, body).await?;
     answered(&state, &product, &asked, Some(sent)).await
 }
 
@@ -135,15 +131,13 @@ async fn answered(
     };
     let options = wishes.options()?;
     let text = SeriesText {
-        place: [asked.lon.as_deref(), asked.lat.as_deref()],
-        region: asked.region.as_deref(),
-        line: asked.line.as_deref(),
+        place: asked.place(),
         period: [asked.from.as_deref(), asked.to.as_deref()],
         earth: asked.earth.as_deref(),
         ocean: asked.ocean.as_deref(),
         sent,
     };
-    let series = text.query(state, &layer).await?;
+    let (series, _room) = text.query(state, &layer).await?;
     let of = version(&layer);
     answer(
         state,
@@ -156,12 +150,28 @@ async fn answered(
     .await
 }
 
-/// A cell, a region or a line, and a period, as an address has them.
-pub(crate) struct SeriesText<'a> {
-    /// Longitude and latitude.
-    pub(crate) place: [Option<&'a str>; 2],
+impl AnalysisParameters {
+    fn place(&self) -> PlaceText<'_> {
+        PlaceText {
+            lon: self.lon.as_deref(),
+            lat: self.lat.as_deref(),
+            region: self.region.as_deref(),
+            line: self.line.as_deref(),
+        }
+    }
+}
+
+/// A cell, a region or a line as an address has it.
+pub(crate) struct PlaceText<'a> {
+    pub(crate) lon: Option<&'a str>,
+    pub(crate) lat: Option<&'a str>,
     pub(crate) region: Option<&'a str>,
     pub(crate) line: Option<&'a str>,
+}
+
+/// A cell, a region or a line, and a period, as an address has them.
+pub(crate) struct SeriesText<'a> {
+    pub(crate) place: PlaceText<'a>,
     /// First instant, and the first one after it.
     pub(crate) period: [Option<&'a str>; 2],
     pub(crate) earth: Option<&'a str>,
@@ -177,12 +187,19 @@ pub(crate) enum SentPlace {
 }
 
 impl SentPlace {
-    /// That of a body, whichever it is, and the room that it takes.
+    /// That of a body, whichever it is, and the room that it takes; the address names no other place.
     pub(crate) async fn take(
         state: &AppState,
+        address: &PlaceText<'_>,
         headers: &HeaderMap,
         body: Body,
     ) -> Result<(Self, Room), ServerError> {
+        left_out(&[
+            ("region", address.region.is_some()),
+            ("line", address.line.is_some()),
+            ("lon", address.lon.is_some()),
+            ("lat", address.lat.is_some()),
+        ])?;
         let sent = state.bodies.take(headers, body).await?;
         let read = |text: String| {
             Ok(if geometry_text::is_line(&text) {
@@ -196,17 +213,18 @@ impl SentPlace {
 }
 
 impl SeriesText<'_> {
-    /// The question, if it can be asked of a version.
+    /// The question, if it can be asked of a version, and the room that its region takes, to be kept as long as it is asked.
     pub(crate) async fn query(
         self,
         state: &AppState,
         layer: &Layer,
-    ) -> Result<SeriesQuery, ServerError> {
+    ) -> Result<(SeriesQuery, Option<Room>), ServerError> {
         let missing = ServerError::Missing {
             name: "region",
             wanted: "a region, a line, or lon and lat of a cell, and one of them alone",
         };
-        let place = match self.place {
+        let text = self.place;
+        let place = match [text.lon, text.lat] {
             [None, None] => None,
             [Some(lon), Some(lat)] => {
                 let lon = number("lon", lon, "degrees east")?;
@@ -215,10 +233,13 @@ impl SeriesText<'_> {
             }
             [Some(_), None] | [None, Some(_)] => return Err(missing),
         };
-        let (region, line) = match self.sent {
-            Some(SentPlace::Region(region)) => (Some(region), None),
-            Some(SentPlace::Line(line)) => (None, Some(line)),
-            None => (parsed(self.region)?, parsed(self.line)?),
+        let (region, line, room) = match self.sent {
+            Some(SentPlace::Region(region)) => (Some(region), None, None),
+            Some(SentPlace::Line(line)) => (None, Some(line), None),
+            None => {
+                let (region, room) = masks::some_region(state, text.region).await?;
+                (region, parsed(text.line)?, room)
+            }
         };
         let wishes = SeriesWishes {
             place,
@@ -237,7 +258,7 @@ impl SeriesText<'_> {
         if let SeriesQuery::Cell { place, .. } = &query {
             layer.manifest.cell_inside(*place)?;
         }
-        Ok(query)
+        Ok((query, room))
     }
 }
 

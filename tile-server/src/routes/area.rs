@@ -16,6 +16,7 @@ use utoipa::IntoParams;
 
 use crate::error::ServerError;
 use crate::extract::{UrlPath, UrlQuery, left_out, parsed};
+use crate::masks;
 use crate::openapi::words::GeoJson;
 use crate::routes::budget::ocean;
 use crate::routes::statistics::{SeriesOrStatistics, StatisticsText, answer, form, response};
@@ -25,7 +26,8 @@ use crate::state::AppState;
 #[into_params(parameter_in = Query)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct AreaParameters {
-    /// `global`, a name that `/api/regions` lists, `west,south,east,north` in degrees, GeoJSON or well-known text.
+    /// `global`, a name that `/api/regions` lists, `west,south,east,north` in degrees, GeoJSON or well-known text, or `MASK:CODE`: the
+    /// cells where a landed mask has a code, or what it means, such as `basins:5` or `basins:southern`.
     #[param(value_type = String)]
     region: Option<String>,
     /// First instant, ISO 8601 UTC; the product's own unless one is given.
@@ -52,7 +54,7 @@ pub(crate) struct AreaParameters {
     /// Form of the answer: `json`, or its rows alone as `csv` or `arrow`, a file of Arrow; by the header `Accept` unless one is given.
     #[param(value_type = Option<RowsForm>)]
     format: Option<String>,
-    /// Version, as answers name it; the newest unless one is given.
+    /// Version, as answers name it, with or without its digest; the newest unless one is given.
     manifest: Option<String>,
 }
 
@@ -82,10 +84,10 @@ pub(crate) async fn get(
     let Some(region) = asked.region.as_deref() else {
         return Err(ServerError::Missing {
             name: "region",
-            wanted: "global, a name that /api/regions lists, west,south,east,north in degrees, GeoJSON or WKT text",
+            wanted: "global, a name that /api/regions lists, west,south,east,north in degrees, GeoJSON or WKT text, or MASK:CODE",
         });
     };
-    let region = region.parse()?;
+    let (region, _room) = masks::region(&state, region).await?;
     answered(&state, &headers, &product, &asked, region).await
 }
 

@@ -20,9 +20,11 @@ use contract::time::TimeStep;
 use serde::Deserialize;
 use utoipa::IntoParams;
 
+use crate::bodies::Room;
 use crate::catalogue::Layer;
 use crate::error::ServerError;
 use crate::extract::{UrlPath, UrlQuery, left_out, number, parsed, time, whole_number};
+use crate::masks;
 use crate::openapi::words::GeoJson;
 use crate::state::AppState;
 
@@ -30,8 +32,8 @@ use crate::state::AppState;
 #[into_params(parameter_in = Query)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct BudgetParameters {
-    /// `global` (the default), a name that `/api/regions` lists, `west,south,east,north` in degrees, GeoJSON or
-    /// well-known text.
+    /// `global` (the default), a name that `/api/regions` lists, `west,south,east,north` in degrees, GeoJSON or well-known text, or
+    /// `MASK:CODE`: the cells where a landed mask has a code, or what it means, such as `basins:5` or `basins:southern`.
     region: Option<String>,
     /// First instant, ISO 8601 UTC; the product's own unless one is given.
     from: Option<String>,
@@ -48,7 +50,7 @@ pub(crate) struct BudgetParameters {
     cells: Option<String>,
     /// Landed product whose cells say how much of them is sea or land, in place of Natural Earth.
     ocean: Option<String>,
-    /// Version, as answers name it; the newest unless one is given.
+    /// Version, as answers name it, with or without its digest; the newest unless one is given.
     manifest: Option<String>,
     /// The newest version that was published at an instant (ISO 8601 UTC; a day is its first moment), or one by its name. In place
     /// of `manifest`.
@@ -78,7 +80,7 @@ pub(crate) struct BudgetParameters {
     regions: Option<String>,
 }
 
-/// Where, and what is asked besides.
+/// Where, and what is asked besides. The cells of a mask are still to be looked up.
 struct Read {
     region: Option<AskedRegion>,
     besides: Besides,
@@ -88,18 +90,28 @@ impl BudgetParameters {
     /// What it is about, read from texts.
     fn read(&self) -> Result<Read, ServerError> {
         Ok(Read {
-            region: parsed(self.region.as_deref())?,
+            region: parsed(self.written_region())?,
             besides: self.words()?.asked()?,
         })
     }
 
-    /// The question about a version.
+    /// A region that is written out, and no cells of a mask.
+    fn written_region(&self) -> Option<&str> {
+        let region = self.region.as_deref();
+        region.filter(|text| masks::of_mask(text).is_none())
+    }
+
+    /// The question about a version, and the room that its region takes, to be kept as long as it is asked.
     async fn query(
         &self,
         state: &AppState,
         layer: &Layer,
         Read { region, besides }: Read,
-    ) -> Result<BudgetQuery, ServerError> {
+    ) -> Result<(BudgetQuery, Option<Room>), ServerError> {
+        let (region, room) = match region {
+            Some(region) => (Some(region), None),
+            None => masks::some_region(state, self.region.as_deref()).await?,
+        };
         let wishes = BudgetWishes {
             region,
             from: time(self.from.as_deref())?,
@@ -115,7 +127,36 @@ impl BudgetParameters {
             let layer = state.catalogue.version(product.as_str(), None).await?;
             versions.insert(product, Arc::clone(&layer.manifest));
         }
-        Ok(besides.of(query, &versions)?)
+        Ok((besides.of(query, &versions)?, room))
+    }
+
+    /// The same with the region, or the parts, of a body, what is read of all, and the room that it takes.
+    async fn sent(
+        mut self,
+        state: &AppState,
+        headers: &HeaderMap,
+        body: Body,
+    ) -> Result<((Self, Read), Room), ServerError> {
+        let sent = state.bodies.take(headers, body).await?;
+        let read = move |text: String| {
+            let is_collection = geometry_text::is_collection(&text);
+            let (name, own) = if is_collection {
+                ("regions", &mut self.regions)
+            } else {
+                ("region", &mut self.region)
+            };
+            left_out(&[(name, own.is_some())])?;
+            *own = Some(text);
+            let read = self.read()?;
+            // What it says is read.
+            if is_collection {
+                self.regions = None;
+            } else {
+                self.region = None;
+            }
+            Ok((self, read))
+        };
+        sent.read(read).await
     }
 
     fn words(&self) -> Result<BudgetWords<'_>, ServerError> {
@@ -188,24 +229,10 @@ pub(crate) async fn post(
     State(state): State<AppState>,
     headers: HeaderMap,
     UrlPath(product): UrlPath<String>,
-    UrlQuery(mut asked): UrlQuery<BudgetParameters>,
+    UrlQuery(asked): UrlQuery<BudgetParameters>,
     body: Body,
 ) -> Result<Response, ServerError> {
-    let sent = state.bodies.take(&headers, body).await?;
-    let read = move |text: String| {
-        let (name, own) = if geometry_text::is_collection(&text) {
-            ("regions", &mut asked.regions)
-        } else {
-            ("region", &mut asked.region)
-        };
-        left_out(&[(name, own.is_some())])?;
-        *own = Some(text);
-        let read = asked.read()?;
-        // What they said is read.
-        (asked.region, asked.regions) = (None, None);
-        Ok((asked, read))
-    };
-    let ((asked, read), _room) = sent.read(read).await?;
+    let ((asked, read), _room) = asked.sent(&state, &headers, body).await?;
     answered(&state, &product, &asked, read).await
 }
 
@@ -225,7 +252,7 @@ async fn answered(
         (Some(as_of), None) => state.catalogue.as_of(product, as_of).await?,
         (None, named) => state.catalogue.version(product, named).await?,
     };
-    let query = asked.query(state, &layer, read).await?;
+    let (query, _room) = asked.query(state, &layer, read).await?;
     // What cannot be asked waits for no turn.
     query.steps(&layer.manifest)?;
     let answer = state.analyses.budget(&layer, query).await?;
@@ -246,13 +273,47 @@ pub(crate) async fn history(
     UrlPath(product): UrlPath<String>,
     UrlQuery(asked): UrlQuery<BudgetParameters>,
 ) -> Result<Response, ServerError> {
+    let read = asked.read()?;
+    history_of(&state, &product, &asked, read).await
+}
+
+/// The same of a region that is sent along: the answer of GET with the text as `region`.
+#[utoipa::path(
+    post,
+    path = "/api/products/{product}/budget/history",
+    operation_id = "budget_history_of",
+    tag = "statistics",
+    params(("product" = String, Path, description = "Name of a carbon flux or of accumulated carbon"), BudgetParameters),
+    request_body(
+        description = "The region, or a `FeatureCollection` of parts with names, in place of the parameter of that name, as GeoJSON of at most 64 MiB and a million vertices",
+        content((GeoJson = "application/geo+json"), (GeoJson = "application/json")),
+    ),
+    responses((status = 200, description = "A line for each version that changed it", body = BudgetHistory)),
+)]
+pub(crate) async fn post_history(
+    State(state): State<AppState>,
+    headers: HeaderMap,
+    UrlPath(product): UrlPath<String>,
+    UrlQuery(asked): UrlQuery<BudgetParameters>,
+    body: Body,
+) -> Result<Response, ServerError> {
+    let ((asked, read), _room) = asked.sent(&state, &headers, body).await?;
+    history_of(&state, &product, &asked, read).await
+}
+
+async fn history_of(
+    state: &AppState,
+    product: &str,
+    asked: &BudgetParameters,
+    read: Read,
+) -> Result<Response, ServerError> {
     if asked.manifest.is_some() || asked.as_of.is_some() {
         return Err(ServerError::Address {
             reason: "a history is of all versions: leave manifest and as_of out".to_owned(),
         });
     }
-    let layer = state.catalogue.version(&product, None).await?;
-    let query = asked.query(&state, &layer, asked.read()?).await?;
+    let layer = state.catalogue.version(product, None).await?;
+    let (query, _room) = asked.query(state, &layer, read).await?;
     let answer = state.analyses.budget_history(&layer, query).await?;
     Ok(([(header::CACHE_CONTROL, "no-cache")], Json(&*answer)).into_response())
 }

@@ -11,9 +11,9 @@ use utoipa::IntoParams;
 
 use crate::backend::SeriesQuestion;
 use crate::error::ServerError;
-use crate::extract::{UrlPath, UrlQuery, left_out, parsed, whole_number};
+use crate::extract::{UrlPath, UrlQuery, parsed, whole_number};
 use crate::openapi::words::GeoJson;
-use crate::routes::analysis::{SentPlace, SeriesText, answer, version};
+use crate::routes::analysis::{PlaceText, SentPlace, SeriesText, answer, version};
 use crate::state::AppState;
 
 #[derive(Debug, Deserialize, IntoParams)]
@@ -38,7 +38,8 @@ pub(crate) struct CorrelationParameters {
     /// Latitude of a cell, degrees north.
     #[param(value_type = Option<f64>, minimum = -90, maximum = 90)]
     lat: Option<String>,
-    /// `global`, a name that `/api/regions` lists, `west,south,east,north` in degrees, GeoJSON or well-known text.
+    /// `global`, a name that `/api/regions` lists, `west,south,east,north` in degrees, GeoJSON or well-known text, or `MASK:CODE`: the
+    /// cells where a landed mask has a code, or what it means, such as `basins:5` or `basins:southern`.
     region: Option<String>,
     /// `LON,LAT;LON,LAT;...` in degrees, GeoJSON or well-known text, in place of a region: the mean along a line, each cell by the length
     /// in it.
@@ -50,10 +51,21 @@ pub(crate) struct CorrelationParameters {
     /// Figure of the earth for areas and lengths; `wgs84` unless one is given.
     #[param(value_type = Option<contract::earth::Earth>)]
     earth: Option<String>,
-    /// Version, as answers name it; the newest unless one is given.
+    /// Version, as answers name it, with or without its digest; the newest unless one is given.
     manifest: Option<String>,
     /// Version of the second product; the newest unless one is given.
     with_manifest: Option<String>,
+}
+
+impl CorrelationParameters {
+    fn place(&self) -> PlaceText<'_> {
+        PlaceText {
+            lon: self.lon.as_deref(),
+            lat: self.lat.as_deref(),
+            region: self.region.as_deref(),
+            line: self.line.as_deref(),
+        }
+    }
 }
 
 /// The correlation of two products over a region, along a line or at a place, at every lag.
@@ -93,13 +105,7 @@ pub(crate) async fn post(
     UrlQuery(asked): UrlQuery<CorrelationParameters>,
     body: Body,
 ) -> Result<Response, ServerError> {
-    left_out(&[
-        ("region", asked.region.is_some()),
-        ("line", asked.line.is_some()),
-        ("lon", asked.lon.is_some()),
-        ("lat", asked.lat.is_some()),
-    ])?;
-    let (sent, _room) = SentPlace::take(&state, &headers, body).await?;
+    let (sent, _room) = SentPlace::take(&state, &asked.place(), &headers, body).await?;
     answered(&state, &product, &asked, Some(sent)).await
 }
 
@@ -122,15 +128,13 @@ async fn answered(
         .version(with, asked.with_manifest.as_deref())
         .await?;
     let series = SeriesText {
-        place: [asked.lon.as_deref(), asked.lat.as_deref()],
-        region: asked.region.as_deref(),
-        line: asked.line.as_deref(),
+        place: asked.place(),
         period: [asked.from.as_deref(), asked.to.as_deref()],
         earth: asked.earth.as_deref(),
         ocean: None,
         sent,
     };
-    let series = series.query(state, &of).await?;
+    let (series, _room) = series.query(state, &of).await?;
     let max_lag = asked.max_lag.as_deref();
     let wishes = CorrelationWishes {
         step: parsed(asked.step.as_deref())?,

@@ -10,9 +10,9 @@ use utoipa::IntoParams;
 
 use crate::backend::SeriesQuestion;
 use crate::error::ServerError;
-use crate::extract::{UrlPath, UrlQuery, left_out, parsed};
+use crate::extract::{UrlPath, UrlQuery, parsed};
 use crate::openapi::words::GeoJson;
-use crate::routes::analysis::{SentPlace, SeriesText, answer, version};
+use crate::routes::analysis::{PlaceText, SentPlace, SeriesText, answer, version};
 use crate::state::AppState;
 
 #[derive(Debug, Deserialize, IntoParams)]
@@ -21,7 +21,7 @@ use crate::state::AppState;
 pub(crate) struct DifferenceParameters {
     /// Years, both part of it: `2001/2005`; all that are covered unless given.
     period: Option<String>,
-    /// Version, as answers name it; the newest unless one is given.
+    /// Version, as answers name it, with or without its digest; the newest unless one is given.
     manifest: Option<String>,
     /// Product that is taken off; the same one unless given.
     minus: Option<String>,
@@ -35,7 +35,8 @@ pub(crate) struct DifferenceParameters {
     /// Latitude of a cell, degrees north.
     #[param(value_type = Option<f64>, minimum = -90, maximum = 90)]
     lat: Option<String>,
-    /// `global`, a name that `/api/regions` lists, `west,south,east,north` in degrees, GeoJSON or well-known text.
+    /// `global`, a name that `/api/regions` lists, `west,south,east,north` in degrees, GeoJSON or well-known text, or `MASK:CODE`: the
+    /// cells where a landed mask has a code, or what it means, such as `basins:5` or `basins:southern`.
     region: Option<String>,
     /// `LON,LAT;LON,LAT;...` in degrees, GeoJSON or well-known text, in place of a region: the mean along a line, each cell by the length
     /// in it.
@@ -43,6 +44,17 @@ pub(crate) struct DifferenceParameters {
     /// Figure of the earth for areas and lengths; `wgs84` unless one is given.
     #[param(value_type = Option<contract::earth::Earth>)]
     earth: Option<String>,
+}
+
+impl DifferenceParameters {
+    fn place(&self) -> PlaceText<'_> {
+        PlaceText {
+            lon: self.lon.as_deref(),
+            lat: self.lat.as_deref(),
+            region: self.region.as_deref(),
+            line: self.line.as_deref(),
+        }
+    }
 }
 
 /// The mean over time of one product, version or period less that of another, with its standard error.
@@ -82,13 +94,7 @@ pub(crate) async fn post(
     UrlQuery(asked): UrlQuery<DifferenceParameters>,
     body: Body,
 ) -> Result<Response, ServerError> {
-    left_out(&[
-        ("region", asked.region.is_some()),
-        ("line", asked.line.is_some()),
-        ("lon", asked.lon.is_some()),
-        ("lat", asked.lat.is_some()),
-    ])?;
-    let (sent, _room) = SentPlace::take(&state, &headers, body).await?;
+    let (sent, _room) = SentPlace::take(&state, &asked.place(), &headers, body).await?;
     answered(&state, &product, &asked, Some(sent)).await
 }
 
@@ -108,15 +114,13 @@ async fn answered(
         .version(other, asked.minus_manifest.as_deref())
         .await?;
     let series = SeriesText {
-        place: [asked.lon.as_deref(), asked.lat.as_deref()],
-        region: asked.region.as_deref(),
-        line: asked.line.as_deref(),
+        place: asked.place(),
         period: [None, None],
         earth: asked.earth.as_deref(),
         ocean: None,
         sent,
     };
-    let series = series.query(state, &of).await?;
+    let (series, _room) = series.query(state, &of).await?;
     let wishes = DifferenceWishes {
         period: parsed(asked.period.as_deref())?,
         minus_period: parsed(asked.minus_period.as_deref())?,

@@ -73,7 +73,7 @@ pub(crate) struct GlobeQuery {
     /// Height of the picture, pixels; 512 unless one is given.
     #[param(value_type = Option<u32>, minimum = 1, maximum = 7680)]
     height: Option<String>,
-    /// Version, as answers name it; the newest unless one is given.
+    /// Version, as answers name it, with or without its digest; the newest unless one is given.
     manifest: Option<String>,
     /// Everything else that shapes the picture, as `content-location` and the list of products name it: with `time`,
     /// `manifest` and the edition of now the answer may be kept for ever.

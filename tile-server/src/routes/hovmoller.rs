@@ -36,7 +36,7 @@ pub(crate) struct HovmollerParameters {
     /// Figure of the earth for areas; `wgs84` unless one is given.
     #[param(value_type = Option<contract::earth::Earth>)]
     earth: Option<String>,
-    /// Version, as answers name it; the newest unless one is given.
+    /// Version, as answers name it, with or without its digest; the newest unless one is given.
     manifest: Option<String>,
 }
 

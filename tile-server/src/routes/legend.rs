@@ -20,7 +20,7 @@ use legend::{Form, Legend};
 #[derive(Debug, Deserialize, IntoParams)]
 #[into_params(parameter_in = Query)]
 pub(crate) struct LegendQuery {
-    /// Version, as answers name it; the newest unless one is given.
+    /// Version, as answers name it, with or without its digest; the newest unless one is given.
     manifest: Option<String>,
     /// Mode of the pictures: a flow is coloured by its speed.
     #[param(value_type = Option<words::Mode>)]

@@ -47,7 +47,7 @@ pub(crate) struct PointParameters {
     /// Form of the answer: `json`, or its rows alone as `csv` or `arrow`, a file of Arrow; by the header `Accept` unless one is given.
     #[param(value_type = Option<RowsForm>)]
     format: Option<String>,
-    /// Version, as answers name it; the newest unless one is given.
+    /// Version, as answers name it, with or without its digest; the newest unless one is given.
     manifest: Option<String>,
 }
 

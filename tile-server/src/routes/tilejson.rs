@@ -36,7 +36,7 @@ pub(crate) struct TileJsonQuery {
     /// Instant that the tiles show, ISO 8601 UTC.
     #[param(example = "2000-01-16T12:00:00Z")]
     time: Option<String>,
-    /// Version, as answers name it; the newest unless one is given.
+    /// Version, as answers name it, with or without its digest; the newest unless one is given.
     manifest: Option<String>,
     #[serde(flatten)]
     #[param(ignore)]

@@ -36,7 +36,7 @@ pub(crate) struct TileQuery {
     /// Pixels a side, 256 or 512.
     #[param(value_type = Option<u32>)]
     size: Option<String>,
-    /// Version, as answers name it; the newest unless one is given.
+    /// Version, as answers name it, with or without its digest; the newest unless one is given.
     manifest: Option<String>,
     /// Everything else that shapes the picture, as TileJSON and the list of products name it: with `time`, `manifest` and the
     /// edition of now the answer may be kept for ever.

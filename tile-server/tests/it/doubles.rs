@@ -18,6 +18,7 @@ use contract::job::RenderJob;
 use contract::manifest::{Manifest, ManifestId, Step};
 use contract::observation::{Filter, Observation, Page, Platform, TrackPoint, TrackQuery};
 use contract::quantity::Quantity;
+use contract::region::{AskedRegion, MaskCode};
 use contract::rows::{Columns, RowsForm};
 use contract::series::{
     Cell, CellCounts, PointSeries, PointValue, RegionSeries, RegionSeriesQuery, RegionValue,
@@ -33,6 +34,8 @@ use tile_server::backend::{
     Analyse, BackendError, Class, Draw, Keep, MadeOfSeries, Observe, SeriesQuestion, Turn, Version,
 };
 use tokio::sync::Semaphore;
+
+use crate::posted::SQUARE;
 
 /// How a double answers.
 #[derive(Debug, Clone, Default)]
@@ -227,6 +230,7 @@ pub(crate) struct Analyst {
     pub(crate) statistics: Mutex<Vec<StatisticsQuery>>,
     pub(crate) encoded: Mutex<Vec<RowsForm>>,
     pub(crate) made: Mutex<Vec<SeriesQuestion>>,
+    pub(crate) mask_regions: Mutex<Vec<String>>,
     pub(crate) check: Mutex<Option<Check>>,
     pub(crate) mood: Mutex<Mood>,
     /// Series of places wait for one of these each, if there are any.
@@ -351,6 +355,26 @@ impl Analyse for Analyst {
             version_count: 0,
             notes: vec![],
             versions: vec![],
+        })
+    }
+
+    /// A square, if it is not the code 99.
+    async fn mask_region(
+        &self,
+        mask: &Manifest,
+        code: &MaskCode,
+    ) -> Result<AskedRegion, BackendError> {
+        self.mood().apply()?;
+        let asked = format!("{}:{code}", mask.id());
+        self.mask_regions.lock().unwrap().push(asked.clone());
+        if *code == MaskCode::Number(99.0) {
+            let text = "no cell has this code; there are 1, 5, 12345";
+            return Err(BackendError::new(Class::BadRequest, text));
+        }
+        let square: AskedRegion = SQUARE.parse().unwrap();
+        Ok(AskedRegion {
+            name: asked,
+            ..square
         })
     }
 

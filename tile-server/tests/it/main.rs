@@ -23,6 +23,7 @@ mod hostile;
 mod limits;
 mod live;
 mod look;
+mod masks;
 mod metrics;
 mod observations;
 mod openapi;

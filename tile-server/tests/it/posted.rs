@@ -1,11 +1,12 @@
 //! Questions whose geometry is sent along: the answers of GET, within limits, and nothing else takes a body.
 
 use std::convert::Infallible;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 use axum::body::{Body, Bytes};
 use axum::http::{Request, StatusCode};
-use futures::StreamExt as _;
 use futures::stream;
 use tower::ServiceExt as _;
 
@@ -22,7 +23,7 @@ const LIMIT: Duration = Duration::from_secs(30);
 const HELD: &str = "fluxglobe_tile_server_body_bytes";
 
 /// Addresses that take a geometry, the parameter that it stands in, and one that it may be.
-const TAKES: [(&str, &str, &str); 11] = [
+const TAKES: [(&str, &str, &str); 12] = [
     ("sst/area?to=2000-03&format=json", "region", SQUARE),
     ("sst/area?statistic=mean&step=total", "region", SQUARE),
     ("sst/area?to=2000-03&format=csv", "region", SQUARE),
@@ -34,6 +35,7 @@ const TAKES: [(&str, &str, &str); 11] = [
     ("sst/difference?minus=flux", "region", SQUARE),
     ("sst/difference?minus=flux", "line", TRACK),
     ("flux/budget?step=month", "region", SQUARE),
+    ("flux/budget/history?step=month", "region", SQUARE),
 ];
 
 fn escaped(text: &str) -> String {
@@ -204,6 +206,17 @@ async fn what_is_no_geometry_is_refused_and_says_why() {
         ("sst/difference?minus=flux&lat=1", TRACK, "leave lat out"),
         ("flux/budget?region=global", SQUARE, "leave region out"),
         (
+            "flux/budget/history?region=mask:5",
+            SQUARE,
+            "leave region out",
+        ),
+        (
+            "flux/budget/history?as_of=2026-03-01",
+            SQUARE,
+            "of all versions",
+        ),
+        ("sst/analysis?region=mask:5", SQUARE, "leave region out"),
+        (
             "flux/budget?regions=mask",
             r#"{"type":"FeatureCollection"}"#,
             "leave regions out",
@@ -260,20 +273,24 @@ async fn bodies_are_read_as_far_as_the_limit_and_those_of_other_addresses_not_at
     let answer = app.send(announced).await;
     assert_eq!(answer.status, StatusCode::PAYLOAD_TOO_LARGE);
     assert!(answer.reason().contains("67108864"), "{}", answer.reason());
-    // Of unknown length, and without an end.
-    let piece = Bytes::from(vec![b' '; 1 << 20]);
-    let pieces = stream::repeat(piece).map(Ok::<_, Infallible>);
+    // Of unknown length, and without an end: it is read to the limit and one piece beyond it.
+    let (piece, taken) = (
+        Bytes::from(vec![b' '; 1 << 20]),
+        Arc::new(AtomicU64::new(0)),
+    );
+    let counted = Arc::clone(&taken);
+    let pieces = stream::repeat_with(move || {
+        counted.fetch_add(piece.len() as u64, Ordering::SeqCst);
+        Ok::<_, Infallible>(piece.clone())
+    });
     let answer = posted(&app, "sst/area", Body::from_stream(pieces)).await;
     assert_eq!(answer.status, StatusCode::PAYLOAD_TOO_LARGE);
+    assert_eq!(taken.load(Ordering::SeqCst), LONGEST + (1 << 20));
     // What is asked by GET carries as little as before, and nothing else takes a body.
     let get = Request::get("/api/products/sst/area?region=global").header("content-length", "4097");
     let answer = app.send(get.body(Body::empty()).unwrap()).await;
     assert_eq!(answer.status, StatusCode::PAYLOAD_TOO_LARGE);
-    for path in [
-        "sst/point?lon=0&lat=0",
-        "sst/hovmoller?along=lat",
-        "flux/budget/history",
-    ] {
+    for path in ["sst/point?lon=0&lat=0", "sst/hovmoller?along=lat"] {
         let answer = posted(&app, path, SQUARE).await;
         assert_eq!(answer.status, StatusCode::METHOD_NOT_ALLOWED, "{path}");
         assert_eq!(answer.header("allow"), "GET, HEAD", "{path}");

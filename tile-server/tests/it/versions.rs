@@ -50,8 +50,20 @@ async fn series_and_budgets_tell_the_version_that_was_asked_for() {
     for path in ["budget?", "point?lon=15&lat=-5&"] {
         let path = format!("/api/products/flux/{path}");
         assert_eq!(app.get(&path).await.json()["manifest"], new.to_string());
-        let named = format!("{path}manifest={}", old.as_str().unwrap());
-        assert_eq!(app.get(&named).await.json()["manifest"], old);
+        // With its digest or without.
+        for name in [old.as_str().unwrap(), "flux@1"] {
+            let named = format!("{path}manifest={name}");
+            assert_eq!(app.get(&named).await.json()["manifest"], old);
+        }
+        for (name, status) in [
+            ("flux@3", 404),
+            ("sst@1", 404),
+            ("flux", 400),
+            ("flux@", 400),
+        ] {
+            let answer = app.get(&format!("{path}manifest={name}")).await;
+            assert_eq!(answer.status.as_u16(), status, "{name}: {}", answer.text());
+        }
     }
     let computed = app.analyst.versions.lock().unwrap();
     assert_eq!(*computed, [1, 2], "the old one was remembered");

@@ -6,9 +6,9 @@ use async_trait::async_trait;
 use axum::http::{StatusCode, header};
 use contract::digest::Digest;
 use contract::manifest::{MANIFEST_SCHEMA, Manifest, Step};
-use contract::quantity::Quantity;
+use contract::quantity::{Flag, OpenQuantity, OpenWords, Quantity};
 use contract::time::Period;
-use serde_json::Value;
+use serde_json::{Value, json};
 use storage::attached::{Attachment, Failure, Reference, Source, StoreKind};
 use storage::{Store, domain, fields, manifests};
 
@@ -247,4 +247,43 @@ async fn a_cube_that_was_made_again_is_opened_again() {
     let answer = app.get(path).await;
     assert_eq!(answer.status, StatusCode::OK, "{}", answer.text());
     assert_ne!(answer.headers[header::ETAG], before.headers[header::ETAG]);
+}
+
+#[tokio::test]
+async fn a_mask_says_what_its_codes_mean_as_cf_has_it() {
+    let app = TestApp::new().await;
+    let plain = Quantity::open("basin", "1", "Basin").unwrap();
+    app.land("basins", plain, 1).await;
+    let flag = |value, meaning: &str| Flag {
+        value,
+        meaning: meaning.to_owned(),
+    };
+    let Quantity::Open(open) = plain else {
+        panic!("{plain:?} is built in")
+    };
+    let words = OpenWords {
+        flags: vec![flag(5, "southern"), flag(12, "arctic")],
+        ..open.words().clone()
+    };
+    let told = Quantity::Open(OpenQuantity::new(words).unwrap());
+    let attributes = async |version: &str| -> Value {
+        let path = format!("/zarr/basins{version}/basin/zarr.json");
+        let answer = app.get(&path).await;
+        assert_eq!(answer.status, StatusCode::OK, "{}", answer.text());
+        answer.json()["attributes"].clone()
+    };
+    assert!(attributes("").await.get("flag_values").is_none());
+    // Told by a later version of the same steps.
+    app.land("basins", told, 2).await;
+    for version in ["", "@2"] {
+        let own = attributes(version).await;
+        assert_eq!(own["flag_values"], json!([5.0, 12.0]));
+        assert_eq!(own["flag_meanings"], "southern arctic");
+    }
+    assert!(attributes("@1").await.get("flag_values").is_none());
+    let products = app.get("/api/products").await.json();
+    let all = products["products"].as_array().unwrap();
+    let listed = all.iter().find(|one| one["product"] == "basins").unwrap();
+    let flags = json!([{"value": 5, "meaning": "southern"}, {"value": 12, "meaning": "arctic"}]);
+    assert_eq!(listed["quantity"]["flags"], flags);
 }

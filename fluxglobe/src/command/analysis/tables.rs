@@ -59,6 +59,15 @@ fn table(header: &[&str], first_number: usize, rows: impl Iterator<Item = Vec<St
     table.to_string()
 }
 
+/// A text and the unit of its number; a number without a unit is of none.
+fn of_unit(text: String, between: &str, unit: &str) -> String {
+    if unit.is_empty() {
+        text
+    } else {
+        format!("{text}{between}{unit}")
+    }
+}
+
 fn number(value: Option<f64>) -> String {
     value.map_or_else(|| "-".to_owned(), |value| format!("{value:.4}"))
 }
@@ -143,8 +152,11 @@ fn trend(made: &Trend, unit: &str) -> String {
         "allowed for",
     ];
     let told = format!(
-        "{} values of step {} over {:.1} years, mean {:.4} {unit}; {seasons}",
-        made.count, made.step, made.years, made.mean
+        "{} values of step {} over {:.1} years, mean {}; {seasons}",
+        made.count,
+        made.step,
+        made.years,
+        of_unit(format!("{:.4}", made.mean), " ", unit)
     );
     format!("{}\n {told}", table(&header, 1, rows.into_iter()))
 }
@@ -163,13 +175,13 @@ fn season(made: &Season, unit: &str) -> String {
         wave("half-year", &made.semi_annual),
     ];
     let told = format!(
-        "mean {:.4} {unit}; both waves explain {:.1} % of the variance{}, and leave a spread of {:.4}",
-        made.mean,
+        "mean {}; both waves explain {:.1} % of the variance{}, and leave a spread of {:.4}",
+        of_unit(format!("{:.4}", made.mean), " ", unit),
         made.explained_percent,
         if made.has_trend { " about a line" } else { "" },
         made.residual_spread
     );
-    let amplitude = format!("amplitude, {unit}");
+    let amplitude = of_unit("amplitude".to_owned(), ", ", unit);
     let header = ["wave", amplitude.as_str(), "highest on"];
     format!("{}\n {told}", table(&header, 1, rows.into_iter()))
 }

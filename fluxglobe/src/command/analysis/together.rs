@@ -3,6 +3,7 @@
 use anyhow::{Context as _, Result, bail};
 use compute::analysis;
 use contract::analysis::{CorrelationWishes, DifferenceWishes, SeriesQuery, SeriesWishes};
+use contract::manifest::AskedVersion;
 use contract::product::ProductId;
 use storage::Store;
 
@@ -26,15 +27,15 @@ pub(crate) async fn correlate(settings: &Settings, options: &StatsCorrelate) -> 
         earth: Some(options.earth),
         ..at(settings, &store, &options.place).await?
     };
-    let series = series(wishes, first)?;
+    let series = series(wishes, &first.product)?;
     let wishes = CorrelationWishes {
         step: options.step,
         deseasonalise: Some(options.deseasonalise),
         max_lag: options.max_lag,
     };
-    let query = wishes.query(series, second.clone())?;
-    let a = deployment::manifest(&store, first, &settings.data).await?;
-    let b = deployment::manifest(&store, second, &settings.data).await?;
+    let query = wishes.query(series, second.product.clone())?;
+    let a = deployment::version(&store, first, &settings.data).await?;
+    let b = deployment::version(&store, second, &settings.data).await?;
     let bar = progress::bar("correlate", 1);
     let engine = reader(settings, store, &query.series)?;
     let (a, b) = ((&a, &a.id()), (&b, &b.id()));
@@ -59,7 +60,8 @@ pub(crate) async fn correlate(settings: &Settings, options: &StatsCorrelate) -> 
 
 pub(crate) async fn difference(settings: &Settings, options: &StatsDifference) -> Result<()> {
     let store = deployment::store(settings)?;
-    let other = options.minus.as_ref().unwrap_or(&options.product);
+    let same = AskedVersion::from(options.product.product.clone());
+    let other = options.minus.as_ref().unwrap_or(&same);
     let of = version(
         settings,
         &store,
@@ -72,12 +74,12 @@ pub(crate) async fn difference(settings: &Settings, options: &StatsDifference) -
         earth: Some(options.earth),
         ..at(settings, &store, &options.place).await?
     };
-    let all = series(wishes, &options.product)?;
+    let all = series(wishes, &of.product)?;
     let wishes = DifferenceWishes {
         period: options.period,
         minus_period: options.minus_period,
     };
-    let [of_series, minus_series] = wishes.sides(&all, other.clone());
+    let [of_series, minus_series] = wishes.sides(&all, minus.product.clone());
     let bar = progress::bar("compare", 1);
     let engine = reader(settings, store, &all)?;
     let (of_id, minus_id) = (of.id(), minus.id());

@@ -101,7 +101,13 @@ pub(super) fn merge(newest: Option<&Manifest>, granules: &[StoredGranule]) -> Me
             check_fits(granule, base)
         });
         let (change, quantity) = match fits {
-            Ok(quantity) => (add(&mut placed, granule), Some(quantity)),
+            Ok(quantity) => {
+                let change = add(&mut placed, granule);
+                (
+                    told_anew(change, granule, merged.quantity, quantity),
+                    Some(quantity),
+                )
+            }
             Err(rejection) => (Change::Refused(rejection), None),
         };
         if let Change::Taken { .. } = &change {
@@ -112,6 +118,24 @@ pub(super) fn merge(newest: Option<&Manifest>, granules: &[StoredGranule]) -> Me
     }
     (merged.steps, merged.orders) = placed.into_iter().unzip();
     merged
+}
+
+/// A file whose values are there and that says more of what codes mean, which programs of before left out, is taken for that.
+fn told_anew(
+    change: Change,
+    granule: &StoredGranule,
+    before: Option<Quantity>,
+    after: Quantity,
+) -> Change {
+    let is_told = before.is_some_and(|before| before.flags() != after.flags());
+    if change != Change::Same || !is_told {
+        return change;
+    }
+    let steps = granule.reading.steps.iter();
+    Change::Taken {
+        revised: true,
+        periods: steps.map(|step| step.period).collect(),
+    }
 }
 
 fn conflict(detail: String) -> Rejection {

@@ -64,6 +64,7 @@ pub(crate) fn quantity(variable: &Variable) -> Result<Quantity, Rejection> {
             .map_or_else(|| cut(spelling, MAX_UNIT_BYTES), |(unit, _)| unit),
         title,
         range: None,
+        flags: vec![],
     };
     match OpenQuantity::new(words) {
         Ok(open) => Ok(Quantity::Open(open)),

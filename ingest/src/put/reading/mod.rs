@@ -89,7 +89,8 @@ impl Reading {
 }
 
 impl Reading {
-    /// Is it another reading but for the names of fields that were named by their bytes there? Those may be gone.
+    /// Is it another reading but for the names of fields that were named by their bytes there, which may be gone, and for what codes
+    /// mean, which programs of before left out?
     fn renames(&self, there: &Self) -> bool {
         let is_renamed = |old: &Step, new: &Step| {
             let named_alike = Step {
@@ -99,8 +100,11 @@ impl Reading {
             old == new || (named_alike == *new && matches!(old.field.vouches(), Vouched::Bytes(_)))
         };
         let steps = there.steps.iter().zip(&self.steps);
+        let is_untold = there.quantity.flags().is_empty();
+        let joined = there.quantity.joined(self.quantity).filter(|_| is_untold);
         let alike = Self {
             steps: self.steps.clone(),
+            quantity: joined.unwrap_or(there.quantity),
             ..there.clone()
         };
         alike == *self

@@ -1,0 +1,116 @@
+//! A version of a product as somebody asks for it, by as much of its name as they know.
+
+use std::fmt::{Display, Formatter};
+
+use super::{Manifest, ManifestId};
+use crate::ContractError;
+use crate::product::ProductId;
+
+/// A product, and perhaps one of its versions: `NAME`, `NAME@12` or `NAME@12-0a1b2c3d`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct AskedVersion {
+    /// Product.
+    pub product: ProductId,
+    /// The number of a version; the newest without one.
+    pub number: Option<u64>,
+    /// The digest that the version must have, if one was given.
+    pub digest: Option<String>,
+}
+
+impl AskedVersion {
+    /// Is it the version that is asked for?
+    pub fn is(&self, manifest: &Manifest, id: &ManifestId) -> bool {
+        let has_digest = |digest: &String| id.to_string().ends_with(&format!("-{digest}"));
+        self.product == manifest.product
+            && self.number.is_none_or(|number| number == manifest.number)
+            && self.digest.as_ref().is_none_or(has_digest)
+    }
+}
+
+impl From<ProductId> for AskedVersion {
+    fn from(product: ProductId) -> Self {
+        Self {
+            product,
+            number: None,
+            digest: None,
+        }
+    }
+}
+
+impl Display for AskedVersion {
+    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
+        self.product.fmt(f)?;
+        if let Some(number) = self.number {
+            write!(f, "@{number}")?;
+        }
+        if let Some(digest) = &self.digest {
+            write!(f, "-{digest}")?;
+        }
+        Ok(())
+    }
+}
+
+impl std::str::FromStr for AskedVersion {
+    type Err = ContractError;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let Some((product, version)) = text.split_once('@') else {
+            return text.parse::<ProductId>().map(Self::from);
+        };
+        let (number, digest) = match version.split_once('-') {
+            Some((number, digest)) => (number, Some(digest.to_owned())),
+            None => (version, None),
+        };
+        let is_number = !number.is_empty() && number.bytes().all(|b| b.is_ascii_digit());
+        let is_digest = |text: &String| {
+            text.len() == 8 && text.bytes().all(|b| matches!(b, b'0'..=b'9' | b'a'..=b'f'))
+        };
+        let number = number.parse().ok().filter(|_| is_number);
+        if number.is_none() || digest.as_ref().is_some_and(|digest| !is_digest(digest)) {
+            let reason = "give NAME@12 or NAME@12-0a1b2c3d";
+            return Err(ContractError::invalid("version", text, reason));
+        }
+        Ok(Self {
+            product: product.parse()?,
+            number,
+            digest,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_version_is_a_number_with_or_without_its_digest() {
+        let parse = |text: &str| text.parse::<AskedVersion>();
+        let of = |number, digest: Option<&str>| AskedVersion {
+            product: "p".parse().unwrap(),
+            number,
+            digest: digest.map(str::to_owned),
+        };
+        for (text, wanted) in [
+            ("p", of(None, None)),
+            ("p@12", of(Some(12), None)),
+            ("p@12-0a1b2c3d", of(Some(12), Some("0a1b2c3d"))),
+        ] {
+            assert_eq!(parse(text), Ok(wanted.clone()));
+            assert_eq!(wanted.to_string(), text);
+        }
+        for wrong in [
+            "P",
+            "p@",
+            "p@x",
+            "@1",
+            "p@-1",
+            "p@+1",
+            "p@1-",
+            "p@1-0a1b2c3",
+            "p@1-0A1B2C3D",
+            "p@1@2",
+        ] {
+            assert!(parse(wrong).is_err(), "{wrong}");
+        }
+    }
+}
