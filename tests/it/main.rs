@@ -16,6 +16,7 @@ mod exported;
 mod harness_self;
 mod interop;
 mod logged;
+mod masks;
 mod migrate;
 mod quality;
 mod recipe;

@@ -5,6 +5,7 @@ pub mod cluster;
 pub mod gate;
 pub mod granule;
 pub mod http;
+pub mod mask;
 pub mod node;
 pub mod program;
 pub mod proxy;

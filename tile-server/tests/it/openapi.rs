@@ -278,13 +278,14 @@ async fn every_answer_is_as_described() {
 }
 
 /// Addresses that take a geometry, a question to each, and what is sent along.
-const SENT: [(&str, &str, &str); 6] = [
+const SENT: [(&str, &str, &str); 7] = [
     ("area", "sst/area", SQUARE),
     ("line", "sst/line", TRACK),
     ("analysis", "sst/analysis?parts=trend", TRACK),
     ("correlation", "sst/correlation?with=flux", TRACK),
     ("difference", "sst/difference?minus=flux", SQUARE),
     ("budget", "flux/budget", SQUARE),
+    ("budget/history", "flux/budget/history", SQUARE),
 ];
 
 #[tokio::test]
@@ -320,7 +321,7 @@ async fn what_takes_a_geometry_is_described_and_answers_so() {
         let wanted: &[&str] = match name {
             "area" => &["region"],
             "line" => &["line"],
-            "budget" => &[],
+            "budget" | "budget/history" => &[],
             _ => &["lat", "line", "lon", "region"],
         };
         assert_eq!(left_out, wanted, "{name}");
