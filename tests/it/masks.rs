@@ -80,7 +80,10 @@ fn a_code_of_a_mask_is_a_region_by_its_number_and_by_what_it_means() {
     let (cells, boxed) = (budget("basins:south"), budget("-180,-90,180,0"));
     // Rows of 4 degrees: the one over the equator is the south's.
     let with_row = budget("-180,-90,180,2");
-    assert!((cells - with_row).abs() < 1e-9 * with_row.abs(), "{cells} {with_row}");
+    assert!(
+        (cells - with_row).abs() < 1e-9 * with_row.abs(),
+        "{cells} {with_row}"
+    );
     assert!((cells - boxed).abs() > 1e-6, "{cells} {boxed}");
     for (region, status, wanted) in [
         ("basins:7", 400, "there are 1, 12"),
@@ -131,7 +134,11 @@ fn what_codes_mean_is_told_wherever_the_mask_is() {
     assert_eq!(attributes["flag_meanings"], "north nowhere south");
     assert_eq!(attributes["flag_values"], json!([1.0, 3.0, 12.0]));
     // A mask that tells too little, or what is none, lands without it and says so.
-    for (name, meanings) in [("short", "a b"), ("hostile", "a \u{7}b c"), ("twice", "a b a")] {
+    for (name, meanings) in [
+        ("short", "a b"),
+        ("hostile", "a \u{7}b c"),
+        ("twice", "a b a"),
+    ] {
         let file = mask::write(data, name, Some(meanings)).unwrap();
         let words = ["ingest", file.to_str().unwrap()];
         let output = program::run(data, &words).unwrap();
@@ -181,7 +188,10 @@ fn statistics_and_budgets_are_of_the_version_that_is_named() {
         ("budget --product flux@x", "flux@x"),
         ("budget --product flux@1 --as-of 2100", "give one"),
         ("budget --product flux@1 --history", "of all versions"),
-        ("stats polygon --region global --product flux@9", "no version 9"),
+        (
+            "stats polygon --region global --product flux@9",
+            "no version 9",
+        ),
     ] {
         let refused = program::fail(data, &words(command)).unwrap();
         assert!(refused.contains(wanted), "{command}: {refused}");
@@ -208,7 +218,10 @@ fn a_budget_is_a_table_of_commas_too() {
     assert!(rows.iter().all(|row| row.len() == header.len()), "{text}");
     let regions: Vec<&str> = rows.iter().map(|row| row[0]).collect();
     let is = |at: usize, end: &str| regions[at].ends_with(end);
-    assert!(rows.len() == 12 && is(0, ":1 (north)") && is(7, ":12 (south)"), "{text}");
+    assert!(
+        rows.len() == 12 && is(0, ":1 (north)") && is(7, ":12 (south)"),
+        "{text}"
+    );
     assert!(is(8, "global") && is(11, "global"), "{text}");
     let json = "budget --product flux --regions basins --step month --json";
     let answer = program::json(data, &words(json)).unwrap();
@@ -218,7 +231,10 @@ fn a_budget_is_a_table_of_commas_too() {
         assert_eq!(row["start"], rows[8 + at][1]);
     }
     let history = of("--history");
-    assert!(history.starts_with("manifest,published,changed,"), "{history}");
+    assert!(
+        history.starts_with("manifest,published,changed,"),
+        "{history}"
+    );
     assert_eq!(history.lines().count(), 6, "{history}");
     let both = program::fail(data, &words("budget --product flux --csv --json")).unwrap();
     assert!(both.contains("--json"), "{both}");

@@ -193,7 +193,8 @@ export interface paths {
         /** One budget by every version of the product that changed it: what was known when, and what changed it. */
         get: operations["budget_history"];
         put?: never;
-        post?: never;
+        /** The same of a region that is sent along: the answer of GET with the text as `region`. */
+        post: operations["budget_history_of"];
         delete?: never;
         options?: never;
         head?: never;
@@ -989,6 +990,16 @@ export interface components {
              */
             percentiles: components["schemas"]["Percentile"][];
         };
+        /** @description A code and its meaning. */
+        Flag: {
+            /** @description What it means, one word: letters, digits and some signs. */
+            meaning: string;
+            /**
+             * Format: int32
+             * @description The stored value.
+             */
+            value: number;
+        };
         /** @description A geometry, a `Feature` or a `FeatureCollection` (RFC 7946): polygons, or lines. */
         GeoJson: {
             type: string;
@@ -1330,6 +1341,8 @@ export interface components {
         };
         /** @description A quantity that nothing is built in for, by its own words. */
         OpenQuantity: {
+            /** @description What its values mean, where they are codes, in the order of values: `flag_values` and `flag_meanings` of CF. */
+            flags?: components["schemas"]["Flag"][];
             /** @description Its CF standard name, or else its long name or the variable's: lower-case letters, digits and `_`, a letter first. */
             name: string;
             /** @description Lowest and highest stored value, outwards to two digits; none if that is not known. */
@@ -2587,7 +2600,10 @@ export interface operations {
                 lon?: number;
                 /** @description Latitude of a cell, degrees north. */
                 lat?: number;
-                /** @description `global`, a name that `/api/regions` lists, `west,south,east,north` in degrees, GeoJSON or well-known text. */
+                /**
+                 * @description `global`, a name that `/api/regions` lists, `west,south,east,north` in degrees, GeoJSON or well-known text, or `MASK:CODE`: the
+                 *     cells where a landed mask has a code, or what it means, such as `basins:5` or `basins:southern`.
+                 */
                 region?: string;
                 /**
                  * @description `LON,LAT;LON,LAT;...` in degrees, GeoJSON or well-known text, in place of a region: the mean along a line, each cell by the length
@@ -2602,7 +2618,7 @@ export interface operations {
                 earth?: components["schemas"]["Earth"];
                 /** @description Landed product whose cells say how much of them is sea or land, in place of Natural Earth. */
                 ocean?: string;
-                /** @description Version, as answers name it; the newest unless one is given. */
+                /** @description Version, as answers name it, with or without its digest; the newest unless one is given. */
                 manifest?: string;
             };
             header?: never;
@@ -2707,7 +2723,7 @@ export interface operations {
                 earth?: components["schemas"]["Earth"];
                 /** @description Landed product whose cells say how much of them is sea or land, in place of Natural Earth. */
                 ocean?: string;
-                /** @description Version, as answers name it; the newest unless one is given. */
+                /** @description Version, as answers name it, with or without its digest; the newest unless one is given. */
                 manifest?: string;
             };
             header?: never;
@@ -2824,7 +2840,10 @@ export interface operations {
     area: {
         parameters: {
             query: {
-                /** @description `global`, a name that `/api/regions` lists, `west,south,east,north` in degrees, GeoJSON or well-known text. */
+                /**
+                 * @description `global`, a name that `/api/regions` lists, `west,south,east,north` in degrees, GeoJSON or well-known text, or `MASK:CODE`: the
+                 *     cells where a landed mask has a code, or what it means, such as `basins:5` or `basins:southern`.
+                 */
                 region: string;
                 /** @description First instant, ISO 8601 UTC; the product's own unless one is given. */
                 from?: string;
@@ -2847,7 +2866,7 @@ export interface operations {
                 cells?: components["schemas"]["Cells"];
                 /** @description Form of the answer: `json`, or its rows alone as `csv` or `arrow`, a file of Arrow; by the header `Accept` unless one is given. */
                 format?: components["schemas"]["RowsForm"];
-                /** @description Version, as answers name it; the newest unless one is given. */
+                /** @description Version, as answers name it, with or without its digest; the newest unless one is given. */
                 manifest?: string;
             };
             header?: never;
@@ -2975,7 +2994,7 @@ export interface operations {
                 cells?: components["schemas"]["Cells"];
                 /** @description Form of the answer: `json`, or its rows alone as `csv` or `arrow`, a file of Arrow; by the header `Accept` unless one is given. */
                 format?: components["schemas"]["RowsForm"];
-                /** @description Version, as answers name it; the newest unless one is given. */
+                /** @description Version, as answers name it, with or without its digest; the newest unless one is given. */
                 manifest?: string;
             };
             header?: never;
@@ -3116,8 +3135,8 @@ export interface operations {
         parameters: {
             query?: {
                 /**
-                 * @description `global` (the default), a name that `/api/regions` lists, `west,south,east,north` in degrees, GeoJSON or
-                 *     well-known text.
+                 * @description `global` (the default), a name that `/api/regions` lists, `west,south,east,north` in degrees, GeoJSON or well-known text, or
+                 *     `MASK:CODE`: the cells where a landed mask has a code, or what it means, such as `basins:5` or `basins:southern`.
                  */
                 region?: string;
                 /** @description First instant, ISO 8601 UTC; the product's own unless one is given. */
@@ -3132,7 +3151,7 @@ export interface operations {
                 cells?: components["schemas"]["Cells"];
                 /** @description Landed product whose cells say how much of them is sea or land, in place of Natural Earth. */
                 ocean?: string;
-                /** @description Version, as answers name it; the newest unless one is given. */
+                /** @description Version, as answers name it, with or without its digest; the newest unless one is given. */
                 manifest?: string;
                 /**
                  * @description The newest version that was published at an instant (ISO 8601 UTC; a day is its first moment), or one by its name. In place
@@ -3247,8 +3266,8 @@ export interface operations {
         parameters: {
             query?: {
                 /**
-                 * @description `global` (the default), a name that `/api/regions` lists, `west,south,east,north` in degrees, GeoJSON or
-                 *     well-known text.
+                 * @description `global` (the default), a name that `/api/regions` lists, `west,south,east,north` in degrees, GeoJSON or well-known text, or
+                 *     `MASK:CODE`: the cells where a landed mask has a code, or what it means, such as `basins:5` or `basins:southern`.
                  */
                 region?: string;
                 /** @description First instant, ISO 8601 UTC; the product's own unless one is given. */
@@ -3263,7 +3282,7 @@ export interface operations {
                 cells?: components["schemas"]["Cells"];
                 /** @description Landed product whose cells say how much of them is sea or land, in place of Natural Earth. */
                 ocean?: string;
-                /** @description Version, as answers name it; the newest unless one is given. */
+                /** @description Version, as answers name it, with or without its digest; the newest unless one is given. */
                 manifest?: string;
                 /**
                  * @description The newest version that was published at an instant (ISO 8601 UTC; a day is its first moment), or one by its name. In place
@@ -3411,8 +3430,8 @@ export interface operations {
         parameters: {
             query?: {
                 /**
-                 * @description `global` (the default), a name that `/api/regions` lists, `west,south,east,north` in degrees, GeoJSON or
-                 *     well-known text.
+                 * @description `global` (the default), a name that `/api/regions` lists, `west,south,east,north` in degrees, GeoJSON or well-known text, or
+                 *     `MASK:CODE`: the cells where a landed mask has a code, or what it means, such as `basins:5` or `basins:southern`.
                  */
                 region?: string;
                 /** @description First instant, ISO 8601 UTC; the product's own unless one is given. */
@@ -3427,7 +3446,7 @@ export interface operations {
                 cells?: components["schemas"]["Cells"];
                 /** @description Landed product whose cells say how much of them is sea or land, in place of Natural Earth. */
                 ocean?: string;
-                /** @description Version, as answers name it; the newest unless one is given. */
+                /** @description Version, as answers name it, with or without its digest; the newest unless one is given. */
                 manifest?: string;
                 /**
                  * @description The newest version that was published at an instant (ISO 8601 UTC; a day is its first moment), or one by its name. In place
@@ -3538,6 +3557,170 @@ export interface operations {
             };
         };
     };
+    budget_history_of: {
+        parameters: {
+            query?: {
+                /**
+                 * @description `global` (the default), a name that `/api/regions` lists, `west,south,east,north` in degrees, GeoJSON or well-known text, or
+                 *     `MASK:CODE`: the cells where a landed mask has a code, or what it means, such as `basins:5` or `basins:southern`.
+                 */
+                region?: string;
+                /** @description First instant, ISO 8601 UTC; the product's own unless one is given. */
+                from?: string;
+                /** @description First instant after the period; the product's own unless one is given. */
+                to?: string;
+                /** @description What a row covers; `total` unless told otherwise. */
+                step?: components["schemas"]["TimeStep"];
+                /** @description Figure of the earth for areas; `wgs84` unless one is given. */
+                earth?: components["schemas"]["Earth"];
+                /** @description How cells on the coast count; `whole` unless told otherwise. */
+                cells?: components["schemas"]["Cells"];
+                /** @description Landed product whose cells say how much of them is sea or land, in place of Natural Earth. */
+                ocean?: string;
+                /** @description Version, as answers name it, with or without its digest; the newest unless one is given. */
+                manifest?: string;
+                /**
+                 * @description The newest version that was published at an instant (ISO 8601 UTC; a day is its first moment), or one by its name. In place
+                 *     of `manifest`.
+                 */
+                as_of?: string;
+                /**
+                 * @description Standard error of the flux: `20%`, a number with its unit such as `0.3 mol m-2 year-1`, or a product of standard errors on
+                 *     the same grid. With it rows say how uncertain they are.
+                 */
+                error?: string;
+                /** @description How far errors of cells go together, km: exp(-d / length). 0 where the error of each cell is its own. */
+                correlation_length_km?: number;
+                /** @description How long errors of steps go together, days: exp(-t / days). 0, the error of each step is its own, unless given. */
+                correlation_days?: number;
+                /** @description Draws of a Monte Carlo, 10 to 10000: a check, and an interval that holds 95 % of the budgets. */
+                monte_carlo?: number;
+                /** @description The same seed draws the same errors; 0 unless given. */
+                seed?: number;
+                /**
+                 * @description Outgassing of river carbon that is taken off, Tg of carbon a year out of the sea, with its standard error if there is one
+                 *     (`650` or `650±300`), or a product that is summed over the same region.
+                 */
+                river_flux?: string;
+                /** @description Where the number is from; needed with it. */
+                river_source?: string;
+                /**
+                 * @description Parts of the region that are asked for by themselves too, and held against the whole: a GeoJSON `FeatureCollection` whose
+                 *     features have names, or a product that is a mask, of which each code is a part.
+                 */
+                regions?: string;
+            };
+            header?: never;
+            path: {
+                /** @description Name of a carbon flux or of accumulated carbon */
+                product: string;
+            };
+            cookie?: never;
+        };
+        /** @description The region, or a `FeatureCollection` of parts with names, in place of the parameter of that name, as GeoJSON of at most 64 MiB and a million vertices */
+        requestBody: {
+            content: {
+                "application/geo+json": components["schemas"]["GeoJson"];
+                "application/json": components["schemas"]["GeoJson"];
+            };
+        };
+        responses: {
+            /** @description A line for each version that changed it */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["BudgetHistory"];
+                };
+            };
+            /** @description A parameter is not valid, or missing; the reason says what would be */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description Nothing of that name; the reason says where names are listed */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description The answer is still the one whose tag `If-None-Match` names */
+            412: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description The body is longer than 64 MiB */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description The body is not said to be GeoJSON, or is compressed */
+            415: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description A defect of this server */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description A store of others, to which the product is attached, does not hold what it held */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description Too much to do, or a part that is needed does not answer */
+            503: {
+                headers: {
+                    /** @description Seconds after which the same request may succeed */
+                    "retry-after"?: number;
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description The answer took too long */
+            504: {
+                headers: {
+                    /** @description Seconds after which the same request may succeed */
+                    "retry-after"?: number;
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+        };
+    };
     correlation: {
         parameters: {
             query: {
@@ -3553,7 +3736,10 @@ export interface operations {
                 lon?: number;
                 /** @description Latitude of a cell, degrees north. */
                 lat?: number;
-                /** @description `global`, a name that `/api/regions` lists, `west,south,east,north` in degrees, GeoJSON or well-known text. */
+                /**
+                 * @description `global`, a name that `/api/regions` lists, `west,south,east,north` in degrees, GeoJSON or well-known text, or `MASK:CODE`: the
+                 *     cells where a landed mask has a code, or what it means, such as `basins:5` or `basins:southern`.
+                 */
                 region?: string;
                 /**
                  * @description `LON,LAT;LON,LAT;...` in degrees, GeoJSON or well-known text, in place of a region: the mean along a line, each cell by the length
@@ -3566,7 +3752,7 @@ export interface operations {
                 to?: string;
                 /** @description Figure of the earth for areas and lengths; `wgs84` unless one is given. */
                 earth?: components["schemas"]["Earth"];
-                /** @description Version, as answers name it; the newest unless one is given. */
+                /** @description Version, as answers name it, with or without its digest; the newest unless one is given. */
                 manifest?: string;
                 /** @description Version of the second product; the newest unless one is given. */
                 with_manifest?: string;
@@ -3666,7 +3852,7 @@ export interface operations {
                 to?: string;
                 /** @description Figure of the earth for areas and lengths; `wgs84` unless one is given. */
                 earth?: components["schemas"]["Earth"];
-                /** @description Version, as answers name it; the newest unless one is given. */
+                /** @description Version, as answers name it, with or without its digest; the newest unless one is given. */
                 manifest?: string;
                 /** @description Version of the second product; the newest unless one is given. */
                 with_manifest?: string;
@@ -3787,7 +3973,7 @@ export interface operations {
             query?: {
                 /** @description Years, both part of it: `2001/2005`; all that are covered unless given. */
                 period?: string;
-                /** @description Version, as answers name it; the newest unless one is given. */
+                /** @description Version, as answers name it, with or without its digest; the newest unless one is given. */
                 manifest?: string;
                 /** @description Product that is taken off; the same one unless given. */
                 minus?: string;
@@ -3799,7 +3985,10 @@ export interface operations {
                 lon?: number;
                 /** @description Latitude of a cell, degrees north. */
                 lat?: number;
-                /** @description `global`, a name that `/api/regions` lists, `west,south,east,north` in degrees, GeoJSON or well-known text. */
+                /**
+                 * @description `global`, a name that `/api/regions` lists, `west,south,east,north` in degrees, GeoJSON or well-known text, or `MASK:CODE`: the
+                 *     cells where a landed mask has a code, or what it means, such as `basins:5` or `basins:southern`.
+                 */
                 region?: string;
                 /**
                  * @description `LON,LAT;LON,LAT;...` in degrees, GeoJSON or well-known text, in place of a region: the mean along a line, each cell by the length
@@ -3892,7 +4081,7 @@ export interface operations {
             query?: {
                 /** @description Years, both part of it: `2001/2005`; all that are covered unless given. */
                 period?: string;
-                /** @description Version, as answers name it; the newest unless one is given. */
+                /** @description Version, as answers name it, with or without its digest; the newest unless one is given. */
                 manifest?: string;
                 /** @description Product that is taken off; the same one unless given. */
                 minus?: string;
@@ -4034,7 +4223,7 @@ export interface operations {
                 to?: string;
                 /** @description Figure of the earth for areas; `wgs84` unless one is given. */
                 earth?: components["schemas"]["Earth"];
-                /** @description Version, as answers name it; the newest unless one is given. */
+                /** @description Version, as answers name it, with or without its digest; the newest unless one is given. */
                 manifest?: string;
             };
             header?: never;
@@ -4118,7 +4307,7 @@ export interface operations {
     legend: {
         parameters: {
             query?: {
-                /** @description Version, as answers name it; the newest unless one is given. */
+                /** @description Version, as answers name it, with or without its digest; the newest unless one is given. */
                 manifest?: string;
                 /** @description Mode of the pictures: a flow is coloured by its speed. */
                 mode?: components["schemas"]["Mode"];
@@ -4264,7 +4453,7 @@ export interface operations {
                 earth?: components["schemas"]["Earth"];
                 /** @description Form of the answer: `json`, or its rows alone as `csv` or `arrow`, a file of Arrow; by the header `Accept` unless one is given. */
                 format?: components["schemas"]["RowsForm"];
-                /** @description Version, as answers name it; the newest unless one is given. */
+                /** @description Version, as answers name it, with or without its digest; the newest unless one is given. */
                 manifest?: string;
             };
             header?: never;
@@ -4367,7 +4556,7 @@ export interface operations {
                 earth?: components["schemas"]["Earth"];
                 /** @description Form of the answer: `json`, or its rows alone as `csv` or `arrow`, a file of Arrow; by the header `Accept` unless one is given. */
                 format?: components["schemas"]["RowsForm"];
-                /** @description Version, as answers name it; the newest unless one is given. */
+                /** @description Version, as answers name it, with or without its digest; the newest unless one is given. */
                 manifest?: string;
             };
             header?: never;
@@ -4507,7 +4696,7 @@ export interface operations {
                 sampling?: components["schemas"]["Sampling"];
                 /** @description Form of the answer: `json`, or its rows alone as `csv` or `arrow`, a file of Arrow; by the header `Accept` unless one is given. */
                 format?: components["schemas"]["RowsForm"];
-                /** @description Version, as answers name it; the newest unless one is given. */
+                /** @description Version, as answers name it, with or without its digest; the newest unless one is given. */
                 manifest?: string;
             };
             header?: never;
@@ -4705,7 +4894,7 @@ export interface operations {
                 width?: number;
                 /** @description Height of the picture, pixels; 512 unless one is given. */
                 height?: number;
-                /** @description Version, as answers name it; the newest unless one is given. */
+                /** @description Version, as answers name it, with or without its digest; the newest unless one is given. */
                 manifest?: string;
                 /**
                  * @description Everything else that shapes the picture, as `content-location` and the list of products name it: with `time`,
@@ -5117,7 +5306,7 @@ export interface operations {
                  * @example 2000-01-16T12:00:00Z
                  */
                 time?: string;
-                /** @description Version, as answers name it; the newest unless one is given. */
+                /** @description Version, as answers name it, with or without its digest; the newest unless one is given. */
                 manifest?: string;
                 /** @description Colours; the quantity's own unless one is named. Not together with `stops`. */
                 palette?: components["schemas"]["Palette"];
@@ -5270,7 +5459,7 @@ export interface operations {
                 time?: string;
                 /** @description Pixels a side, 256 or 512. */
                 size?: number;
-                /** @description Version, as answers name it; the newest unless one is given. */
+                /** @description Version, as answers name it, with or without its digest; the newest unless one is given. */
                 manifest?: string;
                 /**
                  * @description Everything else that shapes the picture, as TileJSON and the list of products name it: with `time`, `manifest` and the
