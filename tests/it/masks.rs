@@ -85,6 +85,11 @@ fn a_code_of_a_mask_is_a_region_by_its_number_and_by_what_it_means() {
         "{cells} {with_row}"
     );
     assert!((cells - boxed).abs() > 1e-6, "{cells} {boxed}");
+    refused(data, &server);
+}
+
+/// Masks and codes that are not there, on both sides.
+fn refused(data: &Path, server: &Server) {
     for (region, status, wanted) in [
         ("basins:7", 400, "there are 1, 12"),
         ("basins:nowhere", 400, "there are 1, 12"),
@@ -94,11 +99,11 @@ fn a_code_of_a_mask_is_a_region_by_its_number_and_by_what_it_means() {
         ("basins@9:1", 404, "basins"),
     ] {
         let words = ["budget", "--product", "flux", "--region", region];
-        let refused = program::fail(data, &words).unwrap();
+        let printed = program::fail(data, &words).unwrap();
         let served = server.get(&format!("/api/products/flux/budget?region={region}"));
         let served = served.unwrap();
         assert_eq!(served.status, status, "{region}: {}", served.text());
-        for text in [refused, served.text().to_owned()] {
+        for text in [printed, served.text()] {
             assert!(text.contains(wanted), "{region}: {text}");
         }
     }
