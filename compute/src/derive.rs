@@ -11,12 +11,15 @@ mod source;
 mod statistic;
 mod steps;
 
+use std::sync::Arc;
+
 use contract::digest::Digest;
 use contract::event::Body;
 use contract::manifest::Manifest;
 use contract::product::ProductId;
 use contract::quantity::Quantity;
 use contract::time::{Period, TimeMs};
+use cube::AtHand;
 use futures::future::BoxFuture;
 use storage::{StorageError, Store, manifests};
 
@@ -196,7 +199,16 @@ fn of_all(done_steps: usize, steps: &[SourceStep<'_>]) -> DeriveProgress {
 
 /// Publishes the manifest under the next free number, and brings its cube there, unless another writer published the same derivation meanwhile, or
 /// one of newer versions of what it is made from.
-async fn commit(engine: &Engine, mut derived: Manifest) -> Result<Manifest, ComputeError> {
+async fn commit(engine: &Engine, derived: Manifest) -> Result<Manifest, ComputeError> {
+    commit_with(engine, derived, None).await
+}
+
+/// The same for who has the version's values at hand, which its cube is then made of.
+async fn commit_with(
+    engine: &Engine,
+    mut derived: Manifest,
+    at_hand: Option<Arc<dyn AtHand>>,
+) -> Result<Manifest, ComputeError> {
     let mut attempt = 1;
     loop {
         let latest = manifests::latest(engine.store(), &derived.product).await?;
@@ -214,7 +226,7 @@ async fn commit(engine: &Engine, mut derived: Manifest) -> Result<Manifest, Comp
         };
         match manifests::commit(engine.store(), &manifest).await {
             Ok(version) => {
-                cube::keep_up_as(engine.store(), &manifest, &version).await;
+                cube::keep_up_with(engine.store(), &manifest, &version, at_hand).await;
                 return Ok(manifest);
             }
             Err(StorageError::Conflict { .. }) if attempt < COMMIT_ATTEMPTS => attempt += 1,

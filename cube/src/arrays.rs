@@ -38,7 +38,7 @@ const VALUES_ZSTD_LEVEL: i32 = 1;
 const ZSTD_LEVEL: i32 = 3;
 /// The same of blocks along time and of sums of them: below 0 no numbers are coded bit by bit, and to decode a block takes a third
 /// of the time, for a tenth more bytes (docs/decisions/035-quick-statistics.md).
-const QUICK_ZSTD_LEVEL: i32 = -1;
+pub(crate) const QUICK_ZSTD_LEVEL: i32 = -1;
 
 /// An array without a store: what it is like.
 pub(crate) type Definition = Array<()>;

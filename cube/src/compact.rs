@@ -12,13 +12,12 @@ use futures::future::BoxFuture;
 use futures::stream::{self, StreamExt as _, TryStreamExt as _};
 use icechunk::format::manifest::ChunkPayload;
 use icechunk::format::{ChunkIndices, Path};
-use icechunk::session::{Session, SessionErrorKind};
+use icechunk::session::SessionErrorKind;
 use serde_json::Map;
 use storage::Store;
-use tokio::sync::RwLock;
 use zarrs_icechunk::AsyncIcechunkStore;
 
-use crate::arrays::{self, Definition, SERIES, SERIES_OF_BEFORE};
+use crate::arrays::{self, Definition, SERIES};
 use crate::blocks::RunAxis;
 use crate::edit::ATTEMPTS;
 use crate::field::SeriesEncoder;
@@ -26,7 +25,7 @@ use crate::layout::RUN_STEPS;
 use crate::series;
 use crate::state::State;
 use crate::sums::Basis;
-use crate::{At, Cube, CubeError, Repository, complete};
+use crate::{At, Cube, CubeError, Repository, complete, placing};
 
 /// Steps whose windows are read at a time.
 const STEPS_AT_ONCE: usize = 16;
@@ -99,12 +98,12 @@ impl Compaction<'_> {
                 let [values, records] = self.encoded(shard, values).await?;
                 let series = async {
                     let at = (&series, RunAxis::First.index(shard, self.run));
-                    let sent = self.send(&session, at, values).await?;
+                    let sent = placing::send_shard(&session, at, values).await?;
                     Ok::<_, CubeError>((shard, sent))
                 };
                 let sums = async {
                     let at = (&sums, RunAxis::Last.index(shard, self.run));
-                    let sent = self.send(&session, at, records).await?;
+                    let sent = placing::send_shard(&session, at, records).await?;
                     Ok::<_, CubeError>((shard, sent))
                 };
                 tokio::try_join!(series, sums)
@@ -162,24 +161,8 @@ impl Compaction<'_> {
         Ok([series?, sums?])
     }
 
-    async fn send(
-        &self,
-        session: &RwLock<Session>,
-        (path, index): (&Path, [u32; 3]),
-        content: Option<Bytes>,
-    ) -> Result<Option<ChunkPayload>, CubeError> {
-        let failed = |e: &dyn std::fmt::Display| self.repository.failed("storing a series", e);
-        let Some(content) = content else {
-            return Ok(None);
-        };
-        let index = ChunkIndices(index.to_vec());
-        let writer = session.read().await.get_chunk_writer(path, &index);
-        let payload = writer.map_err(|e| failed(&e))?(content).await;
-        payload.map(Some).map_err(|e| failed(&e))
-    }
-
     fn series_path(&self) -> Result<Path, CubeError> {
-        self.path(&arrays::series(self.cube.description(), 1)?)
+        placing::series_path(self.cube.description())
     }
 
     fn sums_path(&self) -> Result<Path, CubeError> {
@@ -228,16 +211,6 @@ impl Compaction<'_> {
         })
     }
 
-    /// Removes the time-major copy that a program of before made.
-    async fn drop_copy_of_before(&self, session: &RwLock<Session>) -> Result<(), CubeError> {
-        let failed = |e: &dyn std::fmt::Display| self.repository.failed("placing a series", e);
-        let path = Path::new(&format!("/{SERIES_OF_BEFORE}")).map_err(|e| failed(&e))?;
-        match session.write().await.delete_group(path).await {
-            Err(e) if !matches!(e.kind, SessionErrorKind::NodeNotFound { .. }) => Err(failed(&e)),
-            _ => Ok(()),
-        }
-    }
-
     /// Writes what was made over a state.
     async fn write(&self, state: &State, made: &Made, name: Digest) -> Result<(), CubeError> {
         let failed = |e: &dyn std::fmt::Display| self.repository.failed("placing a series", e);
@@ -247,7 +220,7 @@ impl Compaction<'_> {
             let runs = state.runs.clone().with(run, name);
             let array = arrays::series(description, runs.len())?;
             runs.write(&arrays, (SERIES, Map::new()), array).await?;
-            self.drop_copy_of_before(&state.session).await?;
+            placing::drop_copy_of_before(self.repository, &state.session).await?;
         }
         // Those that somebody else has made meanwhile count as they say, and others cannot be put beside them.
         let basis = self.basis.as_ref();

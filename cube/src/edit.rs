@@ -188,6 +188,11 @@ impl<'a> Edit<'a> {
         }
     }
 
+    /// What sends chunks.
+    pub(crate) fn uploads(&self) -> &RwLock<Session> {
+        &self.uploads
+    }
+
     pub(crate) fn staged(&self) -> &AllStaged {
         &self.staged
     }

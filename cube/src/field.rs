@@ -14,7 +14,7 @@ use zarrs::array::{
 };
 
 use crate::arrays::{self, Definition};
-use crate::layout::RUN_STEPS;
+use crate::layout::{BLOCK_CELLS, RUN_STEPS};
 use crate::summing::records;
 use crate::sums::Basis;
 use crate::{CubeError, Description, Layout};
@@ -199,6 +199,11 @@ impl SeriesEncoder {
             rows: self.shard[0].min(self.grid.rows - row),
             cols: self.shard[1].min(self.grid.cols - col),
         }
+    }
+
+    /// Rows and columns of blocks in a shard.
+    pub(crate) fn shard_blocks(&self) -> [u32; 2] {
+        self.shard.map(|cells| cells / BLOCK_CELLS)
     }
 
     /// Columns of a shard, cells.

@@ -22,10 +22,11 @@ use storage::{Store, fields, manifests};
 use crate::bands::WholeField;
 use crate::edit::ATTEMPTS;
 use crate::field_bands::FieldBands;
+use crate::handing::{Handed, Handing};
 use crate::plan::Plan;
 use crate::staged::Staged;
 use crate::state::State;
-use crate::{CubeError, Description, Edit, Repository, Step, background};
+use crate::{AtHand, CubeError, Description, Edit, Repository, Step, background, placing};
 
 /// Memory that fields on their way may take together, bytes.
 const WAY_BYTES: usize = 128 << 20;
@@ -61,13 +62,28 @@ pub fn follow<'a>(
     store: &'a Store,
     manifest: &'a Manifest,
 ) -> BoxFuture<'a, Result<Followed, CubeError>> {
-    Box::pin(async move { follow_as(store, manifest, manifest.id()).await })
+    follow_with(store, manifest, manifest.id(), None)
+}
+
+/// The same for who knows the name of the version, and has values of it at hand: what of them is not in the cube yet is put there and
+/// no field is read for it, and runs of steps are time-major at once.
+///
+/// # Errors
+/// As there.
+pub fn follow_with<'a>(
+    store: &'a Store,
+    manifest: &'a Manifest,
+    version: ManifestId,
+    at_hand: Option<&'a dyn AtHand>,
+) -> BoxFuture<'a, Result<Followed, CubeError>> {
+    Box::pin(async move { follow_as(store, manifest, version, at_hand).await })
 }
 
 async fn follow_as(
     store: &Store,
     manifest: &Manifest,
     version: ManifestId,
+    at_hand: Option<&dyn AtHand>,
 ) -> Result<Followed, CubeError> {
     let follower = Follower {
         store,
@@ -75,7 +91,7 @@ async fn follow_as(
         fields: store,
         told: &|_period| (),
     };
-    follower.run_as(manifest, version).await
+    follower.run_as(manifest, version, at_hand).await
 }
 
 /// The same for whoever has just published a version, or found that it was published before and not told of.
@@ -96,6 +112,16 @@ pub fn keep_up_as<'a>(
     manifest: &'a Manifest,
     version: &'a ManifestId,
 ) -> BoxFuture<'a, ()> {
+    keep_up_with(store, manifest, version, None)
+}
+
+/// The same for who has values of the version at hand.
+pub fn keep_up_with<'a>(
+    store: &'a Store,
+    manifest: &'a Manifest,
+    version: &'a ManifestId,
+    at_hand: Option<Arc<dyn AtHand>>,
+) -> BoxFuture<'a, ()> {
     Box::pin(async move {
         match store.attached_to(manifest).await {
             // A cube is a copy of values, and these are not to be copied.
@@ -112,7 +138,8 @@ pub fn keep_up_as<'a>(
         }
         let (own, steps, name) = (store.clone(), manifest.clone(), version.clone());
         // A task of its own: a panic over a damaged cube ends there.
-        let followed = tokio::spawn(async move { follow_as(&own, &steps, name).await });
+        let followed =
+            tokio::spawn(async move { follow_as(&own, &steps, name, at_hand.as_deref()).await });
         let error = match followed.await {
             Ok(Ok(_followed)) => {
                 return background::begin(store.clone(), folder(&manifest.product));
@@ -152,19 +179,21 @@ impl Follower<'_> {
     /// # Errors
     /// `Foreign` if the cube is of another version of this number, or of another product. A field that cannot be read.
     pub fn run<'a>(&'a self, manifest: &'a Manifest) -> BoxFuture<'a, Result<Followed, CubeError>> {
-        self.run_as(manifest, manifest.id())
+        self.run_as(manifest, manifest.id(), None)
     }
 
-    /// The same for who knows the name of the version.
+    /// The same for who knows the name of the version, and has values of it at hand.
     fn run_as<'a>(
         &'a self,
         manifest: &'a Manifest,
         version: ManifestId,
+        mut at_hand: Option<&'a dyn AtHand>,
     ) -> BoxFuture<'a, Result<Followed, CubeError>> {
         Box::pin(async move {
             let description = Description::named(manifest, version.clone());
             let repository = Repository::for_change(self.store, self.folder, &description).await?;
             let mut edit = Edit::describing(&repository, description.clone()).await?;
+            let mut handed = Handed::default();
             for _attempt in 0..ATTEMPTS {
                 let state = State::newest(&repository).await?;
                 if let Some(there) = self.settled(&repository, &state, &version).await? {
@@ -173,11 +202,25 @@ impl Follower<'_> {
                         put_count: edit.staged().len(),
                     });
                 }
+                if let Some(at_hand) = at_hand.take() {
+                    let handing = Handing::of(manifest, &description, &state);
+                    handed = handing.send(&edit, at_hand).await?;
+                    for (period, staged) in std::mem::take(&mut handed.steps) {
+                        (self.told)(period);
+                        edit.stage(staged);
+                    }
+                }
                 let plan = self.plan(manifest, &description, &state, &mut edit).await?;
                 let committed = edit.lay(&state, &plan, &version.to_string()).await?;
                 if let Some(snapshot) = committed {
                     let tag = version.number.to_string();
                     repository.tag(&tag, &snapshot).await?;
+                    // The version is there: what of its time-major copy is not is made behind whoever publishes.
+                    let placed =
+                        placing::place(&repository, &description, (&plan.steps, handed.runs)).await;
+                    if let Err(error) = placed {
+                        tracing::warn!(%version, %error, "runs of steps are made time-major later");
+                    }
                     return Ok(Followed {
                         version,
                         put_count: edit.staged().len(),

@@ -3,6 +3,7 @@
 //! A level is summed up from the cells themselves, in the order of rows and, within one, of columns, however the rows come: the
 //! same bits in bands of any height. What is handed from level to level are sums in double precision and not their rounded means.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use contract::earth::Earth;
@@ -170,14 +171,23 @@ struct Joining {
 }
 
 impl Joining {
-    /// Takes a row of the level below; the row of blocks that is complete with it.
-    fn take(&mut self, row: &[Block], method: Method) -> Option<Vec<Block>> {
+    /// Takes a row of the level below, of which those parts that hold data are among the columns of `held`, what a part is made of given
+    /// by `part`; the row of blocks that is complete with it.
+    fn take<T>(
+        &mut self,
+        (row, held): (&[T], Range<usize>),
+        part: impl Fn(&T) -> Block,
+        method: Method,
+    ) -> Option<Vec<Block>> {
         let [down, across] = self.parts;
         let (at, own) = (self.next % down, self.next / down);
-        for (parts, block) in row.chunks(across as usize).zip(&mut self.blocks) {
-            for (col, part) in parts.iter().enumerate() {
-                let is_middle = at == down / 2 && col as u32 == across / 2;
-                block.take(part, is_middle);
+        let across = across as usize;
+        let touched = held.start / across..held.end.div_ceil(across);
+        let parts = row.chunks(across).zip(&mut self.blocks);
+        for (parts, block) in parts.take(touched.end).skip(touched.start) {
+            for (col, own) in parts.iter().enumerate() {
+                let is_middle = at == down / 2 && col == across / 2;
+                block.take(&part(own), is_middle);
             }
         }
         self.next += 1;
@@ -254,19 +264,23 @@ impl Joiner {
         for row in values.chunks_exact(self.cols) {
             let area_m2 = self.cells_m2[self.next as usize];
             self.next += 1;
-            let cells = row.iter();
-            for value in cells.clone().filter(|value| value.is_finite()) {
+            let is_held = |value: &f32| value.is_finite();
+            let first = row.iter().position(is_held).unwrap_or(row.len());
+            let end = row.iter().rposition(is_held).map_or(first, |last| last + 1);
+            for value in row[first..end].iter().filter(|value| value.is_finite()) {
                 let [least, most] = self.range.unwrap_or([*value; 2]);
                 self.range = Some([least.min(*value), most.max(*value)]);
             }
-            let mut blocks: Vec<Block> = cells
-                .map(|value| Block::of(*value, area_m2, self.method))
-                .collect();
-            for level in &mut self.levels {
-                match level.take(&blocks, self.method) {
-                    Some(complete) => blocks = complete,
-                    None => break,
-                }
+            let method = self.method;
+            let mut levels = self.levels.iter_mut();
+            let cell = |value: &f32| Block::of(*value, area_m2, method);
+            let mut blocks = levels
+                .next()
+                .and_then(|level| level.take((row, first..end), cell, method));
+            for level in levels {
+                let Some(complete) = blocks else { break };
+                let all = 0..complete.len();
+                blocks = level.take((&complete, all), |part| *part, method);
             }
         }
     }

@@ -6,6 +6,7 @@
 //! kept (storage), and what is done with them (the services).
 
 mod arrays;
+mod at_hand;
 mod axis;
 mod background;
 mod bands;
@@ -24,6 +25,7 @@ mod field_windows;
 mod follow;
 pub mod foreign;
 mod group;
+mod handing;
 mod joined;
 mod joining;
 mod keys;
@@ -35,12 +37,14 @@ pub mod migrate;
 mod names;
 mod object_storage;
 mod parts;
+mod placing;
 mod plain;
 mod plan;
 mod reader;
 mod record;
 mod repository;
 mod rounding;
+mod run_shards;
 pub mod scale;
 mod series;
 mod shards;
@@ -56,6 +60,7 @@ pub mod weight_unit;
 mod windows;
 
 pub use arrays::{Places, places};
+pub use at_hand::{AtHand, RunValues};
 pub use axis::Step;
 pub use background::compacted;
 pub use bands::{Bands, WholeField};
@@ -65,7 +70,9 @@ pub use edit::{Committed, Edit};
 pub use encoded_sums::EncodedSums;
 pub use error::CubeError;
 pub use field_bands::FieldBands;
-pub use follow::{Followed, Follower, folder, follow, keep_up, keep_up_as};
+pub use follow::{
+    Followed, Follower, folder, follow, follow_with, keep_up, keep_up_as, keep_up_with,
+};
 pub use joined::{joined_window, range_of_field};
 pub use joining::WHOLLY_COVERED;
 pub use keys::Keys;

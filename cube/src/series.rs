@@ -17,7 +17,7 @@ use crate::layout::RUN_STEPS;
 use crate::{CubeError, Step, group, names};
 
 /// So many steps more are worth making the last run anew.
-const LEAST_NEW: usize = 16;
+pub(crate) const LEAST_NEW: usize = 16;
 
 /// Runs from the first step on: of which steps each was made, none where it is not there.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]

@@ -1,7 +1,7 @@
 """Statistics of every cell in a polygon over many years: `fluxglobe derive statistic` beside xarray with flox, and pymannkendall.
 
 Of some 46,000 cells of the made-up China Sea (`fluxglobe generate china-sea --years N`, 450 x 615 cells a day): the monthly
-climatology, the anomaly of every day, and the trend of every cell with its significance: Theil and Sen's slope through means of
+climatology, the anomaly of every day and of every month, and the trend of every cell with its significance: Theil and Sen's slope through means of
 months, seasons taken off, with Mann and Kendall's test (variance after Hamed and Rao 1998), and least squares with an effective
 number of values (Santer et al. 2000). Both sides read what they have landed, files in the page cache, and store what they find:
 ours as products (fields, a cube in both layouts, levels), the peer as Zarr in its layout by time, which is its quickest for all of
@@ -37,6 +37,9 @@ LEAST_SQUARES = ["least-squares-trend", "least-squares-trend-p-value"]
 NORMALS = [*CLIMATOLOGY, *TREND]
 ALL = [*CLIMATOLOGY, *ANOMALY, *TREND]
 ASKED = [CLIMATOLOGY, ANOMALY, TREND, LEAST_SQUARES, NORMALS, ALL]
+# The same with anomalies of means of months.
+ASKED_BY_MONTH = [ANOMALY, ALL]
+MONTHLY = "anomaly of months"
 # Cells that the peer tests.
 TREND_CELLS = 1000
 # Values that a trend needs.
@@ -66,6 +69,7 @@ def main():
             own = Own(options, folder, product, ring)
             try:
                 own_s = {" + ".join(asked): own.derive(asked) for asked in ASKED}
+                own_s |= {by_month(asked): own.derive(asked, step="month") for asked in ASKED_BY_MONTH}
                 worst = compared(own.exported(Path(work)), theirs)
             finally:
                 own.forget()
@@ -82,6 +86,10 @@ def arguments():
     return parser.parse_args()
 
 
+def by_month(asked):
+    return " + ".join(asked).replace("anomaly", MONTHLY)
+
+
 class Own:
     """Products that are derived, each under a name that no run before has taken: what is there already is not derived again."""
 
@@ -90,18 +98,24 @@ class Own:
         self.region = "POLYGON((" + ",".join(f"{x} {y}" for x, y in [*ring, ring[0]]) + "))"
         self.name = f"{NAME}-{int(time.time())}"
         self.count = 0
+        # The first product of each statistic.
+        self.products = {}
         # Every file that is read was read before.
         self.derive(["mean"])
 
-    def derive(self, statistics):
+    def derive(self, statistics, step=None):
         """Seconds of the whole command."""
-        tiles.say(f"fluxglobe: {', '.join(statistics)}")
+        tiles.say(f"fluxglobe: {', '.join(statistics)}{f' by {step}' if step else ''}")
         self.count += 1
         begin = time.perf_counter()
         words = ["--region", self.region, "--statistic", ",".join(statistics), "--least-percent", 0, "--name", self.named(statistics)]
+        words += ["--step", step] if step else []
         tiles.run(self.program, "--data", self.folder, "derive", "statistic", "--product", self.product, *words)
         seconds = time.perf_counter() - begin
         tiles.say(f"  {seconds:.2f} s")
+        for statistic in statistics:
+            key = MONTHLY if (statistic, step) == ("anomaly", "month") else statistic
+            self.products.setdefault(key, f"{self.name}-{self.count}-{statistic}")
         return seconds
 
     def named(self, statistics):
@@ -111,13 +125,11 @@ class Own:
         """What was found, by statistic, as arrays in the memory of whoever looks at them."""
         import xarray as xr
 
-        listed = json.loads(tiles.run(self.program, "--data", self.folder, "products", "--json"))
         found = {}
-        for product in sorted(row["product"] for row in listed if row["product"].startswith(self.name)):
-            statistic = product.removeprefix(f"{self.name}-").split("-", 1)[1]
-            target = work / f"{product}.zarr"
-            if statistic in found or statistic == "mean":
+        for statistic, product in self.products.items():
+            if statistic == "mean":
                 continue
+            target = work / f"{product}.zarr"
             tiles.run(self.program, "--data", self.folder, "export", product, "--to", "zarr", target)
             cube = xr.open_zarr(target)
             array = next(array for name, array in cube.data_vars.items() if array.ndim == 3)
@@ -163,6 +175,9 @@ def xarray(folder, work, peer, ring):
         begin = time.perf_counter()
         off, times = deseasonalised(window)
         parts["means of months"] = time.perf_counter() - begin
+        begin = time.perf_counter()
+        found[MONTHLY] = stored_months(off, times, window, work / "months.zarr")
+        parts["anomalies of months stored"] = time.perf_counter() - begin
     years = middles(times)
     begin = time.perf_counter()
     found["least squares"] = least_squares(off, years)
@@ -202,6 +217,16 @@ def stored(climatology, anomaly, place):
     for array in both.values():
         array.encoding = {}
     xr.Dataset(both).to_zarr(place)
+    return xr.open_zarr(place)["anomaly"]
+
+
+def stored_months(anomalies, months, window, place):
+    """Anomalies of months, in chunks of all of time."""
+    import xarray as xr
+
+    axes = {"time": months, "lat": window["lat"].values, "lon": window["lon"].values}
+    array = xr.DataArray(anomalies.astype("float32"), dims=tuple(axes), coords=axes)
+    array.chunk({"time": -1, "lat": 41, "lon": 45}).to_dataset(name="anomaly").to_zarr(place)
     return xr.open_zarr(place)["anomaly"]
 
 
@@ -330,6 +355,11 @@ def compared(ours, theirs):
     if (own["time"].values.astype("datetime64[D]") != other["time"].values.astype("datetime64[D]")).any():
         sys.exit("anomaly: steps of other days")
     check("anomaly", own.values, other.values * stats.GRAMS_A_YEAR)
+    own, other = cells(MONTHLY), theirs[MONTHLY]
+    # A month is told by its middle here, by its first instant there.
+    if (own["time"].values.astype("datetime64[M]") != other["time"].values.astype("datetime64[M]")).any():
+        sys.exit("anomaly of months: other months")
+    check(MONTHLY, own.values, other.values * stats.GRAMS_A_YEAR)
     slope = cells("least-squares-trend").isel(time=0).values
     check("least-squares-trend", slope, theirs["least squares"]["least-squares-trend"] * stats.GRAMS_A_YEAR)
     p_value = cells("least-squares-trend-p-value").isel(time=0).values
@@ -366,14 +396,16 @@ def print_table(options, own_s, peer_s, cells, worst):
         " + ".join(LEAST_SQUARES): means + peer_s["least squares"],
         " + ".join(NORMALS): climatology + means + peer_s["tests"],
         " + ".join(ALL): both + means + peer_s["tests"],
+        MONTHLY: means + peer_s["anomalies of months stored"],
+        by_month(ALL): climatology + means + peer_s["anomalies of months stored"] + peer_s["tests"],
     }
     if options.json:
         print(json.dumps({"ours_s": own_s, "peer_s": theirs, "peer_parts_s": peer_s, "cells": cells, "differ": worst}, indent=1))
         return
     print(f"{os.cpu_count()} processors, {options.years} years of days, {cells} cells of a polygon, files in the page cache, what is found is stored")
-    print(f"{'statistic':52}{'fluxglobe':>12}{'the peer':>12}{'times':>9}")
+    print(f"{'statistic':60}{'fluxglobe':>12}{'the peer':>12}{'times':>9}")
     for name, seconds in own_s.items():
-        print(f"{name:52}{seconds:10.2f} s{theirs[name]:10.2f} s{theirs[name] / seconds:8.1f}x")
+        print(f"{name:60}{seconds:10.2f} s{theirs[name]:10.2f} s{theirs[name] / seconds:8.1f}x")
     one = peer_s["test of one cell"] * 1e3
     print(f"of the peer's trends {peer_s['tests']:.1f} s are reckoned: {TREND_CELLS} cells were tested, one takes all processors {one:.2f} ms")
     rest = peer_s["least squares"] + peer_s["means of months"]

@@ -7,7 +7,7 @@ use super::line::Line;
 /// Milliseconds in a Julian year of 365.25 days.
 pub const YEAR_MS: f64 = 365.25 * 86_400_000.0;
 /// Share of a bin's time that must hold data for its mean to count.
-const LEAST_SHARE: f64 = 0.5;
+pub const LEAST_SHARE: f64 = 0.5;
 
 /// Middles of periods, years of 365.25 days after the first one's.
 pub fn middles_years(periods: &[Period]) -> Vec<f64> {
@@ -76,6 +76,17 @@ impl Bins {
     /// The bins.
     pub fn periods(&self) -> &[Period] {
         &self.bins
+    }
+
+    /// Of each bin the first step that reaches into it, and how many seconds of that and of each one after it lie in it; nothing
+    /// of steps that are taken as they are.
+    pub fn shares(&self) -> impl Iterator<Item = (Period, usize, &[f64])> {
+        let inside: &[(usize, Vec<f64>)] = match &self.steps {
+            Steps::Native(_) => &[],
+            Steps::Inside(inside) => inside,
+        };
+        let bins = self.bins.iter().zip(inside);
+        bins.map(|(bin, (from, shared_s))| (*bin, *from, &shared_s[..]))
     }
 
     /// Means over the bins, NaN where less than half of a bin's time holds data: each step counts by the time of it that lies

@@ -4,9 +4,13 @@ mod anomalies;
 mod blocks;
 mod cells;
 mod landed;
+mod means;
 mod pairs;
+mod parts_of_year;
 mod plan;
 mod quantity;
+mod ranges;
+mod runs;
 mod sources;
 mod wanted;
 
@@ -19,7 +23,7 @@ use futures::future::BoxFuture;
 use storage::manifests;
 
 use super::made_from::made_from;
-use super::{Progress, commit};
+use super::{Progress, commit_with};
 use crate::{ComputeError, Engine};
 use landed::{Landing, computed};
 use plan::Plan;
@@ -96,11 +100,11 @@ pub fn derive_statistics<'a>(
                 plan: &plan,
                 wanted: &wanted,
             };
-            let derived = match plan.statistic {
+            let (derived, at_hand) = match plan.statistic {
                 MapStatistic::Anomaly => landing.anomalies(computed, progress).await?,
-                _ => landing.each(computed).await?,
+                _ => (landing.each(computed).await?, None),
             };
-            made.push(commit(engine, derived).await?);
+            made.push(commit_with(engine, derived, at_hand).await?);
         }
         Ok(made)
     })

@@ -5,6 +5,8 @@ mod accumulated;
 #[cfg(test)]
 mod analysed;
 #[cfg(test)]
+mod anomalies;
+#[cfg(test)]
 mod budgets;
 #[cfg(test)]
 mod cleaned;

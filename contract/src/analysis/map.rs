@@ -36,7 +36,7 @@ pub enum MapStatistic {
     Spread,
     /// Mean of each month or season over the base period.
     Climatology,
-    /// Each step less the climatology.
+    /// Each step, or each mean of some, less the climatology.
     Anomaly,
     /// Amplitude of the year's wave.
     Amplitude,
@@ -190,13 +190,17 @@ pub struct MapOptions {
     /// Means that trends are drawn through and correlations made of.
     #[serde(skip_serializing_if = "is_usual")]
     pub step: TimeStep,
+    /// Means that anomalies are of; the product's own steps if absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub anomaly_step: Option<TimeStep>,
     /// What a correlation is with; absent of everything else.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub correlation: Option<MapCorrelation>,
     /// Where: cells that lie in it, wholly or in part; everywhere if absent.
     #[serde(skip)]
     pub region: Option<AskedRegion>,
-    /// Product that it becomes; `PRODUCT-STATISTIC` if absent, `-WITH` after it of a correlation, and `-REGION` of a named one.
+    /// Product that it becomes; `PRODUCT-STATISTIC` if absent, `-WITH` after it of a correlation, `-STEP` of anomalies of means, and
+    /// `-REGION` of a named one.
     #[serde(skip)]
     pub name: Option<ProductId>,
 }
@@ -212,6 +216,7 @@ impl MapOptions {
             to: None,
             least_percent: 50,
             step: AnalysisOptions::USUAL_STEP,
+            anomaly_step: None,
             correlation: None,
             region: None,
             name: None,
@@ -234,9 +239,10 @@ impl MapOptions {
     pub fn target(&self, product: &ProductId) -> Result<ProductId, ContractError> {
         let statistic = self.statistic.word();
         let with = self.correlation.as_ref().map(|own| &own.with);
-        let of_both = match with {
-            Some(with) => format!("{product}-{statistic}-{with}"),
-            None => format!("{product}-{statistic}"),
+        let of_both = match (with, self.anomaly_step) {
+            (Some(with), _) => format!("{product}-{statistic}-{with}"),
+            (None, Some(step)) => format!("{product}-{statistic}-{}", step.as_str()),
+            (None, None) => format!("{product}-{statistic}"),
         };
         let name = match (&self.name, &self.region) {
             (Some(name), _) => name.clone(),
@@ -314,6 +320,21 @@ mod tests {
         let json = serde_json::to_string(&MapOptions::new(MapStatistic::Trend)).unwrap();
         let always = r#"{"statistic":"trend","base":null,"bins":"month","from":null,"to":null,"least_percent":50}"#;
         assert_eq!(json, always);
+    }
+
+    #[test]
+    fn anomalies_of_means_have_names_and_bytes_of_their_own() {
+        let of = |anomaly_step| MapOptions {
+            anomaly_step,
+            ..MapOptions::new(MapStatistic::Anomaly)
+        };
+        let product: ProductId = "sst".parse().unwrap();
+        let name = |step| of(step).target(&product).unwrap().to_string();
+        assert_eq!(name(None), "sst-anomaly");
+        assert_eq!(name(Some(TimeStep::Month)), "sst-anomaly-month");
+        let json = |step| serde_json::to_string(&of(step)).unwrap();
+        assert!(!json(None).contains("step"));
+        assert!(json(Some(TimeStep::Month)).contains(r#""anomaly_step":"month""#));
     }
 
     #[test]

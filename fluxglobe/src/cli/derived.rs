@@ -36,7 +36,8 @@ pub(crate) struct DeriveStatistic {
     pub(crate) product: ProductId,
     /// One or more, separated by commas; the product is read once for all: mean, min, max, median, p97.5 and the like,
     /// min-time and max-time (when), count and coverage (steps and share of the time with data), spread (standard deviation),
-    /// climatology (a step a month or season), anomaly (every step less the climatology), amplitude and phase of the year's wave,
+    /// climatology (a step a month or season), anomaly (every step, or every mean of a --step, less the climatology), amplitude and
+    /// phase of the year's wave,
     /// trend (Theil-Sen), trend-p-value (Mann-Kendall, Hamed-Rao), least-squares-trend, least-squares-trend-p-value; together with
     /// the product --with: correlation, correlation-p-value, correlation-pairs, correlation-effective-pairs.
     #[arg(long, value_name = "NAME,...", value_delimiter = ',', required = true)]
@@ -55,8 +56,8 @@ pub(crate) struct DeriveStatistic {
     /// Take the mean of each calendar month off both products of a correlation first: two with seasons always go together.
     #[arg(long, requires = "with")]
     pub(crate) deseasonalise: bool,
-    /// Means that trends are drawn through and correlations made of. Of trends steps as they are where those are longer; `native`
-    /// correlations need the same periods of both. Months if absent.
+    /// Means that trends are drawn through, and correlations and anomalies made of. Of trends steps as they are where those are longer;
+    /// `native` correlations need the same periods of both. If absent months, and of anomalies every step.
     #[arg(long, visible_alias = "step", value_name = STEPS)]
     pub(crate) trend_step: Option<TimeStep>,
     /// Only the cells that lie in it, wholly or in part: `global`, a named region, a box WEST,SOUTH,EAST,NORTH, a GeoJSON or WKT
@@ -110,11 +111,15 @@ impl DeriveStatistic {
             _ => {}
         }
         let has_step = |one: &MapStatistic| one.is_trend() || one.is_of_two();
+        let is_anomaly = |one: &MapStatistic| *one == MapStatistic::Anomaly;
         if let Some(step) = self.trend_step
-            && !self.statistic.iter().any(has_step)
+            && !self
+                .statistic
+                .iter()
+                .any(|one| has_step(one) || is_anomaly(one))
         {
             bail!(
-                "nothing is made of means of a {step}: --trend-step is for trends and correlations"
+                "nothing is made of means of a {step}: --step is for trends, correlations and anomalies"
             );
         }
         let one = |statistic: &MapStatistic| -> Result<MapOptions> {
@@ -134,6 +139,9 @@ impl DeriveStatistic {
                     .trend_step
                     .filter(|_| has_step(statistic))
                     .unwrap_or(AnalysisOptions::USUAL_STEP),
+                anomaly_step: self
+                    .trend_step
+                    .filter(|step| is_anomaly(statistic) && *step != TimeStep::Native),
                 correlation: correlation.clone().filter(|_| statistic.is_of_two()),
                 region: region.cloned(),
                 name,
@@ -177,11 +185,27 @@ mod tests {
             [TimeStep::Month, TimeStep::Year]
         );
         assert_eq!(asked("trend").unwrap()[0].step, TimeStep::Month);
+        for (words, step) in [
+            ("anomaly", None),
+            ("anomaly --step native", None),
+            (
+                "anomaly,climatology,trend --step month",
+                Some(TimeStep::Month),
+            ),
+            ("anomaly,trend --step year", Some(TimeStep::Year)),
+        ] {
+            let all = asked(words).unwrap();
+            assert_eq!(all[0].anomaly_step, step, "{words}");
+            assert!(all[1..].iter().all(|one| one.anomaly_step.is_none()));
+            // What is asked of anomalies is not asked of them as of trends: their products' bytes hang on it.
+            assert_eq!(all[0].step, TimeStep::Month, "{words}");
+        }
         for (words, reason) in [
             ("correlation", "give the second"),
             ("mean --with wind", "for correlations"),
             ("mean --lag 1", "--with"),
             ("mean --trend-step year", "for trends"),
+            ("climatology --step month", "anomalies"),
             ("mean --deseasonalise", "--with"),
         ] {
             let refused = asked(words).unwrap_err().to_string();

@@ -1,29 +1,32 @@
-//! Anomalies landed: step by step, the climatology taken off.
+//! Anomalies landed: step by step, or mean by mean, the climatology taken off.
 //!
 //! Where there is memory for it, the blocks of cells that are wanted are read along time, a run of steps at once; else whole fields.
 
-use std::ops::Range;
 use std::sync::Arc;
 
-use contract::grid::Grid;
 use contract::key::ObjectKey;
 use contract::manifest::{Manifest, Step};
-use contract::time::Period;
-use cube::Block;
+use cube::AtHand;
 use futures::{FutureExt as _, StreamExt as _, TryStreamExt as _, stream};
-use storage::{Encoded, StorageError, fields};
+use storage::{StorageError, fields};
 
 use super::super::{DeriveProgress, Progress};
 use super::blocks::Blocks;
 use super::landed::{Found, Landing};
+use super::means::{MeanOf, Sum};
+use super::plan::Output;
+use super::runs::{Less, MadeRun, OfAnomalies, Runs};
 use crate::ComputeError;
 
 /// Most fields on their way for each that can be encoded at once: others are flushed to the disk meanwhile.
 const ON_THEIR_WAY: usize = 4;
 /// Share of the memory for work that they may take.
 const FIELDS_SHARE: usize = 8;
-/// Bytes of a cell on its way: its value, in its pages, as they are stored.
-const CELL_BYTES: usize = 12;
+/// Bytes of a cell on its way: its value, in its pages, as they are stored, and the sum that it may be made of.
+const CELL_BYTES: usize = 28;
+
+/// A version to be published, and what its cube can be made of.
+pub(super) type Made = (Manifest, Option<Arc<dyn AtHand>>);
 
 impl Landing<'_> {
     /// Stores everything but the manifest, which is returned with number 0; `normals` are those of every bin, `[bin][row, col]`,
@@ -32,75 +35,141 @@ impl Landing<'_> {
         &self,
         normals: Vec<Vec<f64>>,
         progress: &Progress<'_>,
-    ) -> Result<Manifest, ComputeError> {
+    ) -> Result<Made, ComputeError> {
         let (plan, source, engine) = (self.plan, self.sources.first, self.engine);
-        let (grid, factor) = (source.grid, plan.factor);
+        let bin = |output: &Output| plan.parts.of_period(output.period);
         let less = Arc::new(Less {
-            grid,
+            grid: source.grid,
+            of: Arc::clone(&plan.anomalies_of),
+            bins: plan.outputs.iter().map(bin).collect(),
             normals,
-            factor,
+            factor: plan.factor,
         });
-        let values = engine.values(source, &source.id()).await?;
         let blocks = Blocks::of(
-            &grid,
+            &source.grid,
             self.wanted,
             source.steps.len(),
             engine.memory_bytes(),
         );
-        let (values, blocks) = (&values, &blocks);
-        let read = |steps: Range<usize>| async move {
-            let held = blocks.in_run(values, source, steps.clone()).await?;
-            Ok::<_, ComputeError>(Arc::new(Run { steps, held }))
+        let Some(blocks) = blocks.held_in_runs(&source.grid) else {
+            return Ok((self.by_fields(&less, progress).await?, None));
         };
-        let each = |run: Arc<Run>| {
-            let less = Arc::clone(&less);
-            let steps = run.steps.clone();
-            let step = move |step| Ok(self.anomaly(step, Arc::clone(&run), Arc::clone(&less)));
-            stream::iter(steps.map(step))
+        let mut at_hand = OfAnomalies {
+            runs: Runs {
+                source: engine.values(source, &source.id()).await?,
+                blocks,
+                less,
+            },
+            checks: vec![],
         };
-        let runs = values.runs().into_iter();
-        let runs = runs.filter_map(|run| overlap(&run, &plan.written()));
-        let fields = engine.memory_bytes() / FIELDS_SHARE / (grid.cell_count() * CELL_BYTES).max(1);
-        let at_once = fields.clamp(1, ON_THEIR_WAY * engine.partitions().get());
+        let manifest = self.by_runs(&mut at_hand, progress).await?;
+        Ok((manifest, Some(Arc::new(at_hand))))
+    }
+
+    /// Fields that may be on their way at once.
+    fn at_once(&self) -> usize {
+        let (engine, cells) = (self.engine, self.sources.first.grid.cell_count());
+        let fields = engine.memory_bytes() / FIELDS_SHARE / (cells * CELL_BYTES).max(1);
+        fields.clamp(1, ON_THEIR_WAY * engine.partitions().get())
+    }
+
+    /// Anomalies of blocks of cells, a run of steps at once; what is needed to make them again stays in `at_hand`.
+    async fn by_runs(
+        &self,
+        at_hand: &mut OfAnomalies,
+        progress: &Progress<'_>,
+    ) -> Result<Manifest, ComputeError> {
+        let grid = self.sources.first.grid;
+        let (mut found, mut checks) = (Found::nothing(grid.cell_count()), vec![]);
+        let mut steps = vec![];
+        let runs = &at_hand.runs;
+        let each = |(run, made): (usize, MadeRun)| {
+            made.cells(&grid, |cell| found.has_data(cell));
+            checks.push(made.check);
+            let made = Arc::new(made);
+            let step = move |(at, anomaly): (usize, usize)| {
+                let made = Arc::clone(&made);
+                Ok(self.stored(anomaly, 0, move || made.values.map(at, &grid)))
+            };
+            stream::iter(runs.anomalies(run).enumerate().map(step))
+        };
+        let made = stream::iter(0..runs.count())
+            .then(|run| async move { Ok::<_, ComputeError>((run, runs.make(run).await?)) }.boxed());
         // In the order of time.
-        let mut landing = stream::iter(runs)
-            .then(|steps| read(steps).boxed())
+        let mut landing = made
             .map_ok(each)
             .try_flatten()
-            .try_buffered(at_once)
+            .try_buffered(self.at_once())
             .boxed();
-        let mut found = Found::nothing(grid.cell_count());
+        let mut of_steps = Found::nothing(0);
+        while let Some((step, of_step)) = landing.try_next().await? {
+            of_steps.merge(&of_step);
+            steps.push(step);
+            progress(self.done(steps.len()));
+        }
+        drop(landing);
+        found.merge(&of_steps);
+        at_hand.checks = checks;
+        self.manifest(steps, &found).await
+    }
+
+    /// Anomalies of whole fields: where there is no memory for runs of steps.
+    async fn by_fields(
+        &self,
+        less: &Arc<Less>,
+        progress: &Progress<'_>,
+    ) -> Result<Manifest, ComputeError> {
+        let anomaly = |anomaly| async move {
+            let sums = self.sums(&less.of[anomaly]).await?;
+            let less = Arc::clone(less);
+            let cells = sums.len();
+            let values = move || less.map(anomaly, &sums);
+            self.stored(anomaly, cells, values).await
+        };
+        let mut landing = stream::iter(0..less.of.len())
+            .map(|number| anomaly(number).boxed())
+            .buffered(self.at_once())
+            .boxed();
+        let mut found = Found::nothing(self.sources.first.grid.cell_count());
         let mut steps = vec![];
         while let Some((step, of_step)) = landing.try_next().await? {
             found.merge(&of_step);
             steps.push(step);
-            progress(DeriveProgress {
-                done_steps: steps.len(),
-                all_steps: plan.outputs.len(),
-            });
+            progress(self.done(steps.len()));
         }
         drop(landing);
         self.manifest(steps, &found).await
     }
 
-    async fn anomaly(
-        &self,
-        step: usize,
-        run: Arc<Run>,
-        less: Arc<Less>,
-    ) -> Result<(Step, Found), ComputeError> {
+    /// What the steps of a mean come to in every cell.
+    async fn sums(&self, mean: &MeanOf) -> Result<Vec<Sum>, ComputeError> {
         let source = self.sources.first;
-        let (store, grid) = (self.engine.store(), source.grid);
-        let own = &source.steps[step];
-        let output = &self.plan.outputs[step - self.plan.first_written];
-        let (bin, period) = (self.plan.bins.of(own.period), output.period);
-        let field = match run.held {
-            Some(_) => None,
-            None => Some(fields::read(store, &own.field, &grid).await?),
-        };
+        let mut sums = vec![Sum::default(); source.grid.cell_count()];
+        for step in mean.steps.clone() {
+            let field = &source.steps[step].field;
+            let values = fields::read(self.engine.store(), field, &source.grid).await?;
+            for (sum, value) in sums.iter_mut().zip(&values) {
+                mean.add(sum, step, *value);
+            }
+        }
+        Ok(sums)
+    }
+
+    /// Stores an anomaly whose values are made on a thread of their own, and tells which of so many cells hold data.
+    async fn stored(
+        &self,
+        anomaly: usize,
+        cells: usize,
+        values: impl FnOnce() -> Vec<f32> + Send + 'static,
+    ) -> Result<(Step, Found), ComputeError> {
+        let (store, grid) = (self.engine.store(), self.sources.first.grid);
+        let output = &self.plan.outputs[anomaly];
+        let period = output.period;
         let making = move || {
-            let values = field.unwrap_or_else(|| run.map(step, &grid));
-            less.encoded(values, bin, period)
+            let values = values();
+            let mut found = Found::nothing(cells);
+            found.add(&values);
+            Ok::<_, StorageError>((fields::encode(&grid, &values, period)?, found))
         };
         let made = tokio::task::spawn_blocking(making).await;
         let (encoded, found) = made.map_err(|e| ComputeError::inconsistent("an anomaly", e))??;
@@ -108,58 +177,12 @@ impl Landing<'_> {
         store.put_new(&key, encoded.content).await?;
         Ok((output.step(key, found.valid_cells), found))
     }
-}
 
-/// The steps that are in both.
-fn overlap(run: &Range<usize>, other: &Range<usize>) -> Option<Range<usize>> {
-    let both = run.start.max(other.start)..run.end.min(other.end);
-    (!both.is_empty()).then_some(both)
-}
-
-/// Steps that are read together.
-struct Run {
-    steps: Range<usize>,
-    /// Values of the blocks in which any cell is wanted; none where each step is read from its field.
-    held: Option<Vec<Block>>,
-}
-
-impl Run {
-    /// One of its steps, `[row, col]`, NaN where no block is held.
-    fn map(&self, step: usize, grid: &Grid) -> Vec<f32> {
-        let mut map = vec![f32::NAN; grid.cell_count()];
-        let (at, count) = (step - self.steps.start, self.steps.len());
-        for block in self.held.iter().flatten() {
-            let cells = block.window.cell_indices(grid);
-            for (place, values) in cells.zip(block.values.chunks_exact(count)) {
-                map[place] = values[at];
-            }
+    fn done(&self, done_steps: usize) -> DeriveProgress {
+        let all_steps = self.plan.outputs.len();
+        DeriveProgress {
+            done_steps,
+            all_steps,
         }
-        map
-    }
-}
-
-/// What is taken off.
-struct Less {
-    grid: Grid,
-    /// `[bin][row, col]`, stored unit, NaN where nothing is wanted or there is none.
-    normals: Vec<Vec<f64>>,
-    /// From the product's unit to that of anomalies.
-    factor: f64,
-}
-
-impl Less {
-    /// A step less the normals of its bin.
-    fn encoded(
-        &self,
-        mut values: Vec<f32>,
-        bin: usize,
-        period: Period,
-    ) -> Result<(Encoded, Found), StorageError> {
-        for (value, normal) in values.iter_mut().zip(&self.normals[bin]) {
-            *value = ((f64::from(*value) - normal) * self.factor) as f32;
-        }
-        let mut found = Found::nothing(values.len());
-        found.add(&values);
-        Ok((fields::encode(&self.grid, &values, period)?, found))
     }
 }

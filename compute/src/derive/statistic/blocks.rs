@@ -5,7 +5,7 @@ use std::ops::Range;
 use contract::chunk::{Window, windows};
 use contract::grid::Grid;
 use contract::manifest::Manifest;
-use cube::{BLOCK_CELLS, Block, RUN_STEPS, Values};
+use cube::{BLOCK_CELLS, RUN_STEPS, Values};
 
 use super::wanted::Wanted;
 use crate::ComputeError;
@@ -13,7 +13,8 @@ use crate::ComputeError;
 /// Share of the memory for work that the values of some blocks take.
 const HELD_SHARE: usize = 8;
 
-/// Share of the memory for work that the values of all blocks in a run of steps may take, if runs are to be held.
+/// Share of the memory for work that the values of all blocks in a run of steps may take, if runs are to be held: one is read while
+/// one is made, and one waits.
 const RUN_SHARE: usize = 8;
 
 /// Cells over all steps.
@@ -81,7 +82,7 @@ impl Blocks {
             .iter()
             .flat_map(|(_, block)| block.cell_indices(&manifest.grid));
         let places: Vec<usize> = places.collect();
-        let asked = at(blocks, manifest);
+        let asked = at(blocks, &manifest.grid);
         let step_count = manifest.steps.len();
         let mut cells = Cells {
             values: vec![f32::NAN; places.len() * step_count],
@@ -101,24 +102,15 @@ impl Blocks {
         Ok(cells)
     }
 
-    /// All of them at some steps that lie in one run; none where they take too much memory.
-    pub(super) async fn in_run(
-        &self,
-        values: &Values,
-        manifest: &Manifest,
-        steps: Range<usize>,
-    ) -> Result<Option<Vec<Block>>, ComputeError> {
-        if !self.is_run_held {
-            return Ok(None);
-        }
-        let asked = at(&self.windows, manifest);
-        Ok(Some(values.blocks(&asked, steps).await?))
+    /// Rows and columns of all of them; none where a run of steps of all takes too much memory.
+    pub(super) fn held_in_runs(&self, grid: &Grid) -> Option<Vec<[u32; 2]>> {
+        self.is_run_held.then(|| at(&self.windows, grid))
     }
 }
 
 /// Rows and columns of blocks.
-fn at(blocks: &[(u32, Window)], manifest: &Manifest) -> Vec<[u32; 2]> {
-    let across = manifest.grid.cols.div_ceil(BLOCK_CELLS);
+fn at(blocks: &[(u32, Window)], grid: &Grid) -> Vec<[u32; 2]> {
+    let across = grid.cols.div_ceil(BLOCK_CELLS);
     let at = |(number, _): &(u32, Window)| [number / across, number % across];
     blocks.iter().map(at).collect()
 }

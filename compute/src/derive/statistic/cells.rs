@@ -6,13 +6,12 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use contract::analysis::{
-    CalendarBins, CorrelationRow, LeastSquaresTrend, MannKendall, MapStatistic, Season,
-};
+use contract::analysis::{CorrelationRow, LeastSquaresTrend, MannKendall, MapStatistic, Season};
 use contract::computed::CorrelationStatistic;
 use contract::statistics::Percentile;
 use contract::time::{Period, TimeStep};
 
+use super::means::MeanOf;
 use super::pairs::Pairs;
 use super::plan::Plan;
 use crate::analysis::climatology::spread;
@@ -123,14 +122,17 @@ fn once<'a, T>(
 /// One statistic of a cell.
 struct OfCell {
     statistic: MapStatistic,
-    bins: CalendarBins,
+    /// Parts of the year of what has them.
+    bins: usize,
+    /// Means that are gathered in them; none where steps are.
+    means: Option<Arc<[MeanOf]>>,
     least_share: f64,
     over: Over,
     /// Of the steps that are read.
     periods: Vec<Period>,
-    /// Bin of each of them.
+    /// Bin of each of them, or of each mean.
     bin_of: Vec<usize>,
-    /// Steps of each bin.
+    /// Steps, or means, of each bin.
     steps_of: Vec<usize>,
     /// Seconds of each step that is read.
     seconds: Vec<f64>,
@@ -145,8 +147,12 @@ struct OfCell {
 impl OfCell {
     fn new(plan: &Plan, periods: &[Period]) -> Self {
         let periods = periods[plan.read.clone()].to_vec();
-        let bin_of: Vec<usize> = periods.iter().map(|period| plan.bins.of(*period)).collect();
-        let mut steps_of = vec![0; plan.bins.count()];
+        let bin_of = |period: Period| plan.parts.of_period(period);
+        let bin_of: Vec<usize> = match &plan.normals_of {
+            None => periods.iter().map(|period| bin_of(*period)).collect(),
+            Some(means) => means.iter().map(|mean| bin_of(mean.period)).collect(),
+        };
+        let mut steps_of = vec![0; plan.parts.count()];
         for bin in &bin_of {
             steps_of[*bin] += 1;
         }
@@ -157,7 +163,8 @@ impl OfCell {
             trend_steps: None,
             pairs: None,
             statistic: plan.statistic,
-            bins: plan.bins,
+            bins: plan.parts.count(),
+            means: plan.normals_of.clone(),
             least_share: plan.least_share,
             over: Over {
                 read: plan.read.clone(),
@@ -172,7 +179,7 @@ impl OfCell {
     /// Values that a cell has: bins of those that have them, else one.
     fn output_count(&self) -> usize {
         if self.statistic.has_bins() {
-            self.bins.count()
+            self.bins
         } else {
             1
         }
@@ -225,10 +232,21 @@ impl OfCell {
     }
 
     fn bin_means(&self, values: &[f32], out: &mut [f64]) {
+        match &self.means {
+            None => self.means_of(values.iter().map(|value| f64::from(*value)), out),
+            Some(means) => {
+                let first = self.over.read.start;
+                self.means_of(means.iter().map(|mean| mean.of(values, first)), out);
+            }
+        }
+    }
+
+    /// Means of the bins of some values, each of which counts once.
+    fn means_of(&self, values: impl Iterator<Item = f64>, out: &mut [f64]) {
         let mut counts = vec![0usize; out.len()];
         out.fill(0.0);
         for (bin, value) in self.bin_of.iter().zip(values).filter(|(_, v)| !v.is_nan()) {
-            out[*bin] += f64::from(*value);
+            out[*bin] += value;
             counts[*bin] += 1;
         }
         for ((sum, count), all) in out.iter_mut().zip(&counts).zip(&self.steps_of) {

@@ -246,15 +246,27 @@ impl Found {
         }
     }
 
+    /// Adds a step; of how many cells it is told which hold data was said at first.
     pub(super) fn add(&mut self, values: &[f32]) {
         for (cell, value) in self.cells.iter_mut().zip(values) {
-            if !value.is_nan() {
-                *cell = true;
-                self.valid_cells += 1;
-                let [low, high] = self.range;
-                self.range = [low.min(f64::from(*value)), high.max(f64::from(*value))];
-            }
+            *cell |= !value.is_nan();
         }
+        let (mut low, mut high) = (f32::INFINITY, f32::NEG_INFINITY);
+        for value in values {
+            low = if *value < low { *value } else { low };
+            high = if *value > high { *value } else { high };
+        }
+        let has_data = values.iter().filter(|value| !value.is_nan());
+        self.merge(&Self {
+            cells: vec![],
+            range: [low, high].map(f64::from),
+            valid_cells: has_data.count() as u64,
+        });
+    }
+
+    /// A cell, by its place, holds data.
+    pub(super) fn has_data(&mut self, place: usize) {
+        self.cells[place] = true;
     }
 
     pub(super) fn merge(&mut self, other: &Self) {

@@ -1,6 +1,7 @@
 //! What a derivation of a statistic reads and writes: steps in, steps out, each with the digest of what it is made of.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use contract::ContractError;
 use contract::analysis::{AnalysisOptions, BasePeriod, CalendarBins, MapOptions, MapStatistic};
@@ -13,8 +14,11 @@ use contract::region::Region;
 use contract::time::{Period, TimeStep};
 use serde::Serialize;
 
+use super::means::MeanOf;
 use super::pairs::Pairs;
+use super::parts_of_year::PartsOfYear;
 use super::quantity;
+use super::ranges::{Ranges, extent, inside, of_steps};
 use super::sources::SourcesOf;
 use crate::ComputeError;
 use crate::analysis::timeline::longest_s;
@@ -51,7 +55,8 @@ impl Output {
 #[derive(Debug, Clone)]
 pub(super) struct Plan {
     pub(super) statistic: MapStatistic,
-    pub(super) bins: CalendarBins,
+    /// That climatologies and anomalies have.
+    pub(super) parts: PartsOfYear,
     pub(super) least_share: f64,
     /// Means that trends are drawn through.
     pub(super) step: TimeStep,
@@ -61,8 +66,10 @@ pub(super) struct Plan {
     pub(super) computed: Option<Computed>,
     /// Index of the first step that is read, and of the first one after.
     pub(super) read: Range<usize>,
-    /// Index of the first step that an anomaly is written of.
-    pub(super) first_written: usize,
+    /// Means that the normals of anomalies are made of; none where steps are taken as they are.
+    pub(super) normals_of: Option<Arc<[MeanOf]>>,
+    /// What each anomaly is of, one for each output; nothing of other statistics.
+    pub(super) anomalies_of: Arc<[MeanOf]>,
     pub(super) outputs: Vec<Output>,
     pub(super) quantity: Quantity,
     /// What values of the product's unit are multiplied with.
@@ -96,10 +103,13 @@ impl Plan {
             let text = options.least_percent.to_string();
             return Err(ContractError::invalid("least percent", &text, "0 to 100").into());
         }
+        let parts = PartsOfYear::of(options);
         let ranges = Ranges::of(source, options)?;
-        let read = &source.steps[ranges.read.clone()];
-        let periods: Vec<Period> = read.iter().map(|step| step.period).collect();
-        check_steps(statistic, options.bins, &periods)?;
+        let periods: Vec<Period> = match &ranges.normals_of {
+            Some(means) => means.iter().map(|mean| mean.period).collect(),
+            None => of_steps(source, &ranges.read).collect(),
+        };
+        check_steps(statistic, parts, &periods)?;
         let pairs = pairs(sources, options, &ranges)?;
         let over = match &pairs {
             Some(pairs) => pairs.extent(),
@@ -109,14 +119,15 @@ impl Plan {
         let least = options.least_percent;
         Ok(Self {
             statistic,
-            bins: options.bins,
+            parts,
             least_share: f64::from(least) / 100.0,
             step: options.step,
             computed: computed(sources, options),
             outputs: outputs(sources, options, (&ranges, pairs.as_ref()))?,
             pairs,
             read: ranges.read,
-            first_written: ranges.inside.start,
+            normals_of: ranges.normals_of,
+            anomalies_of: ranges.anomalies_of,
             quantity,
             factor,
             title,
@@ -132,11 +143,6 @@ impl Plan {
         }
     }
 
-    /// Steps that anomalies are written of.
-    pub(super) fn written(&self) -> Range<usize> {
-        self.first_written..self.first_written + self.outputs.len()
-    }
-
     /// Was a version made of these very steps in this very way?
     pub(super) fn is_up_to_date(&self, latest: &Manifest, source: &Manifest) -> bool {
         let made_of = latest.steps.iter().map(|step| step.raw_sha256);
@@ -145,45 +151,6 @@ impl Plan {
             && latest.quantity.is_same_kind(self.quantity)
             && made_of.eq(self.outputs.iter().map(|output| output.made_of))
     }
-}
-
-/// Steps by their place.
-struct Ranges {
-    /// That are read.
-    read: Range<usize>,
-    /// That lie in the asked period.
-    inside: Range<usize>,
-    /// Years that normals stand for.
-    base: BasePeriod,
-}
-
-impl Ranges {
-    fn of(source: &Manifest, options: &MapOptions) -> Result<Self, ContractError> {
-        let inside = inside(source, options)?;
-        // Of bins the base period decides what is read; of anomalies the window what is written.
-        let read = match (options.statistic, options.base) {
-            (MapStatistic::Climatology | MapStatistic::Anomaly, Some(base)) => {
-                in_base(source, base)?
-            }
-            (MapStatistic::Anomaly, None) => 0..source.steps.len(),
-            _ => inside.clone(),
-        };
-        let base = options.base.filter(|_| options.statistic.has_bins());
-        Ok(Self {
-            base: base.unwrap_or_else(|| BasePeriod::around(extent(source, &read))),
-            read,
-            inside,
-        })
-    }
-}
-
-/// Steps that reach into the asked period: they follow each other.
-fn inside(source: &Manifest, options: &MapOptions) -> Result<Range<usize>, ContractError> {
-    let (window, _steps) = source.steps_inside(options.from, options.to)?;
-    let touched = |step: &Step| step.period.overlaps(window);
-    let first = source.steps.iter().position(touched).unwrap_or_default();
-    let count = source.steps.iter().filter(|step| touched(step)).count();
-    Ok(first..first + count)
 }
 
 /// What a correlation is made by.
@@ -233,9 +200,9 @@ fn title(options: &MapOptions, base: BasePeriod, over: Period) -> String {
     let is_usual = options.step == AnalysisOptions::USUAL_STEP;
     let mut title = match statistic {
         MapStatistic::Climatology => format!("{} climatology {base}", adjective(options.bins)),
-        MapStatistic::Anomaly => format!("anomaly from {base} by {}", options.bins),
+        MapStatistic::Anomaly => of_anomalies(options, base),
         _ if statistic.is_of_two() || (statistic.is_trend() && !is_usual) => {
-            let (means, over) = (means(options.step), over.in_words());
+            let (means, over) = (in_means(options.step), over.in_words());
             format!("{statistic} of {means} over {over}")
         }
         other => format!("{other} over {}", over.in_words()),
@@ -257,8 +224,19 @@ fn title(options: &MapOptions, base: BasePeriod, over: Period) -> String {
     format!("{title}, where {least} % or more hold data")
 }
 
+/// What is said of anomalies.
+fn of_anomalies(options: &MapOptions, base: BasePeriod) -> String {
+    let of = options.anomaly_step.map_or_else(String::new, |step| {
+        format!(" of means of {}", in_means(step))
+    });
+    match PartsOfYear::of(options) {
+        PartsOfYear::Bins(bins) => format!("anomaly{of} from {base} by {bins}"),
+        PartsOfYear::Whole => format!("anomaly{of} from {base}"),
+    }
+}
+
 /// Means of a step, for people.
-fn means(step: TimeStep) -> &'static str {
+fn in_means(step: TimeStep) -> &'static str {
     match step {
         TimeStep::Native => "steps",
         TimeStep::Day => "days",
@@ -267,14 +245,6 @@ fn means(step: TimeStep) -> &'static str {
         TimeStep::Season => "seasons",
         TimeStep::Year => "years",
         TimeStep::Total => "all the time",
-    }
-}
-
-/// From the first to the last of some steps.
-fn extent(source: &Manifest, range: &Range<usize>) -> Period {
-    Period {
-        start: source.steps[range.start].period.start,
-        end: source.steps[range.end - 1].period.end,
     }
 }
 
@@ -314,15 +284,27 @@ fn outputs(
         MapStatistic::Anomaly => {
             // One digest of the normals, then one a step: of thousands of steps each would name all others.
             let normals = made_of(0);
-            let output = |step: &Step| Output {
-                period: step.period,
-                origin: format!("{} less {base}", step.origin),
-                made_of: Digest::of_json(&("anomaly", normals, step.period, &step.field)),
+            let of_step = |mean: &MeanOf| {
+                let step = &source.steps[mean.steps.start];
+                Output {
+                    period: step.period,
+                    origin: format!("{} less {base}", step.origin),
+                    made_of: Digest::of_json(&("anomaly", normals, step.period, &step.field)),
+                }
             };
-            source.steps[ranges.inside.clone()]
-                .iter()
-                .map(output)
-                .collect()
+            let of_mean = |mean: &MeanOf| {
+                let read = fields(source, &mean.steps);
+                Output {
+                    period: mean.period,
+                    origin: format!("mean of {} steps less {base}", read.len()),
+                    made_of: Digest::of_json(&("anomaly of a mean", normals, mean.period, read)),
+                }
+            };
+            let all = ranges.anomalies_of.iter();
+            match ranges.normals_of {
+                None => all.map(of_step).collect(),
+                Some(_) => all.map(of_mean).collect(),
+            }
         }
         _ => {
             let (over, count) = match pairs {
@@ -347,32 +329,9 @@ fn fields<'a>(source: &'a Manifest, read: &Range<usize>) -> Vec<(Period, &'a Obj
     steps.map(|step| (step.period, &step.field)).collect()
 }
 
-/// Steps whose middle lies in a base period: they follow each other.
-fn in_base(source: &Manifest, base: BasePeriod) -> Result<Range<usize>, ContractError> {
-    let window = base.period();
-    let from = source
-        .steps
-        .partition_point(|step| step.period.mid() < window.start);
-    let to = source
-        .steps
-        .partition_point(|step| step.period.mid() < window.end);
-    if from < to {
-        return Ok(from..to);
-    }
-    let covered = source
-        .extent()
-        .map_or_else(|| "nothing".to_owned(), |all| all.to_string());
-    let reason = format!("{} has no step in it; it covers {covered}", source.product);
-    Err(ContractError::invalid(
-        "base period",
-        &base.to_string(),
-        reason,
-    ))
-}
-
 fn check_steps(
     statistic: MapStatistic,
-    bins: CalendarBins,
+    parts: PartsOfYear,
     periods: &[Period],
 ) -> Result<(), ContractError> {
     let refused = |reason: String| {
@@ -382,7 +341,7 @@ fn check_steps(
             reason,
         ))
     };
-    if statistic.has_bins() {
+    if let (true, PartsOfYear::Bins(bins)) = (statistic.has_bins(), parts) {
         if bins == CalendarBins::Day {
             return refused("maps are made of months and seasons".to_owned());
         }

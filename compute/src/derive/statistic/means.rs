@@ -1,0 +1,134 @@
+//! Means that anomalies are of: steps of a product in, which of them each mean is of and how long they lie in it out.
+
+use std::ops::Range;
+
+use contract::time::{Period, TimeStep};
+
+use crate::analysis::timeline::{Bins, LEAST_SHARE};
+
+/// A mean of steps that follow each other, each by the time of it that lies in the mean's; of a step that is taken as it is its value.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct MeanOf {
+    pub(super) period: Period,
+    /// Steps of the version that reach into it.
+    pub(super) steps: Range<usize>,
+    /// Seconds of each that lie in it.
+    shared_s: Vec<f64>,
+    /// Seconds that must hold data.
+    least_s: f64,
+}
+
+/// What a mean has come to, its steps added in the order of time.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Sum {
+    /// Values times seconds.
+    values_s: f64,
+    with_data_s: f64,
+}
+
+impl MeanOf {
+    /// A step as it is.
+    pub(super) fn of_step(step: usize, period: Period) -> Self {
+        Self {
+            period,
+            steps: step..step + 1,
+            // Whatever is multiplied and divided with it stays what it is.
+            shared_s: vec![1.0],
+            least_s: 1.0,
+        }
+    }
+
+    /// Adds the value of one of its steps, NaN no data.
+    pub(super) fn add(&self, sum: &mut Sum, step: usize, value: f32) {
+        if !value.is_nan() {
+            let shared_s = self.shared_s[step - self.steps.start];
+            sum.values_s += f64::from(value) * shared_s;
+            sum.with_data_s += shared_s;
+        }
+    }
+
+    /// The mean when all of its steps were added, NaN where too little of its time holds data.
+    pub(super) fn mean(&self, sum: Sum) -> f64 {
+        if sum.with_data_s >= self.least_s {
+            sum.values_s / sum.with_data_s
+        } else {
+            f64::NAN
+        }
+    }
+
+    /// The mean of values of which the first is that of step `first`.
+    pub(super) fn of(&self, values: &[f32], first: usize) -> f64 {
+        let mut sum = Sum::default();
+        for step in self.steps.clone() {
+            self.add(&mut sum, step, values[step - first]);
+        }
+        self.mean(sum)
+    }
+}
+
+/// Means over whole bins of the calendar, of steps in the order of time: as trends are drawn through, so that half of a bin's time
+/// must hold data. Bins that steps cover less of are left out: no cell has a mean there.
+pub(super) fn over(periods: &[Period], step: TimeStep) -> Vec<MeanOf> {
+    let bins = Bins::over(periods, step);
+    let mean = |(period, from, shared_s): (Period, usize, &[f64])| {
+        let least_s = LEAST_SHARE * period.seconds();
+        let covered_s: f64 = shared_s.iter().sum();
+        (covered_s >= least_s).then(|| MeanOf {
+            period,
+            steps: from..from + shared_s.len(),
+            shared_s: shared_s.to_vec(),
+            least_s,
+        })
+    };
+    bins.shares().filter_map(mean).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::analysis::timeline::means_over;
+
+    fn days(count: i64, of_days: i64) -> Vec<Period> {
+        let at = |day: i64| contract::time::TimeMs::new(day * 86_400_000).unwrap();
+        let step = |step: i64| Period::new(at(10 + step * of_days), at(10 + (step + 1) * of_days));
+        (0..count).map(|at| step(at).unwrap()).collect()
+    }
+
+    #[test]
+    fn means_are_those_that_trends_are_drawn_through() {
+        for (of_days, step) in [
+            (1, TimeStep::Week),
+            (1, TimeStep::Month),
+            (8, TimeStep::Month),
+            (8, TimeStep::Year),
+        ] {
+            let periods = days(200, of_days);
+            let value = |at: usize| {
+                let gap = at % 7 == 3 || (40..90).contains(&at);
+                if gap { f32::NAN } else { at as f32 * 0.37 }
+            };
+            let values: Vec<f32> = (0..periods.len()).map(value).collect();
+            let wide: Vec<f64> = values.iter().map(|value| f64::from(*value)).collect();
+            let (bins, means) = means_over(&periods, &wide, step);
+            let own = over(&periods, step);
+            let mut left = bins.iter().zip(&means).filter(|(bin, mean)| {
+                let there = own.iter().find(|own| own.period == **bin);
+                let found = there.map_or(f64::NAN, |own| own.of(&values, 0));
+                assert_eq!(found.to_bits(), mean.to_bits(), "{bin} {step:?}");
+                there.is_none()
+            });
+            // The first week and month begin before the first step, and hold enough of it or not.
+            assert!(left.all(|(_bin, mean)| mean.is_nan()));
+            assert!(own.len() >= 3);
+        }
+    }
+
+    #[test]
+    fn a_step_as_it_is_is_its_value() {
+        let own = MeanOf::of_step(7, days(1, 1)[0]);
+        for value in [0.1f32, -0.0, f32::NAN] {
+            let mean = own.of(&[value], 7);
+            assert_eq!((mean as f32).to_bits(), value.to_bits());
+        }
+    }
+}
