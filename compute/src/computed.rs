@@ -5,22 +5,21 @@
 //! those of the newest version that still are what they would be are kept.
 
 pub mod co2_flux;
-mod dependents;
 pub(crate) mod job;
+mod lineage;
 pub(crate) mod make;
 mod matched;
 mod read;
 mod request;
 mod work;
 
-use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::collections::BTreeMap;
 
 use contract::computed::{Computation, Computed, ComputedInput};
 use contract::digest::Digest;
 use contract::grid::Grid;
 use contract::manifest::{MANIFEST_SCHEMA, Manifest, Step};
 use contract::masked::MaskedCells;
-use contract::product::ProductId;
 use futures::future::BoxFuture;
 use storage::domain::Cells;
 use storage::{StorageError, domain, manifests};
@@ -72,6 +71,9 @@ pub fn compute<'a>(
         let latest = manifests::latest(engine.store(), &request.target).await?;
         if let Some(latest) = &latest {
             fits_what_is_there(latest, &plan.job)?;
+            // Nothing was made of what is not there.
+            let inputs = plan.inputs.iter().map(|input| &input.manifest);
+            lineage::check(engine.store(), &request.target, inputs).await?;
         }
         let kept = kept(&plan, latest.as_ref());
         if let Some(latest) = latest.filter(|it| plan.is_what_is_there(request, it, &kept)) {
@@ -93,38 +95,6 @@ pub fn compute<'a>(
             left_out,
             outside,
         })
-    })
-}
-
-/// Brings every product up to date that was computed from one, and whatever was computed from those; their versions, each
-/// after those it was computed from. One that cannot be any more (its inputs have parted) is told of and left as it is.
-pub fn follow<'a>(
-    engine: &'a Engine,
-    product: &'a ProductId,
-) -> BoxFuture<'a, Result<Vec<Manifest>, ComputeError>> {
-    Box::pin(async move {
-        let mut seen = BTreeSet::from([product.clone()]);
-        let mut open = VecDeque::from([product.clone()]);
-        let mut made = vec![];
-        while let Some(source) = open.pop_front() {
-            for request in dependents::of(engine.store(), &source).await? {
-                if !seen.insert(request.target.clone()) {
-                    continue;
-                }
-                match compute(engine, &request, &|_progress| ()).await {
-                    Ok(outcome) => {
-                        open.push_back(request.target);
-                        made.push(outcome.manifest);
-                    }
-                    Err(error) if error.is_retryable() => return Err(error),
-                    Err(error) => {
-                        let product = request.target;
-                        tracing::error!(%product, %error, "cannot be computed again");
-                    }
-                }
-            }
-        }
-        Ok(made)
     })
 }
 
@@ -204,6 +174,7 @@ impl Plan {
             inputs: self.inputs.iter().map(named).collect(),
             from: request.from,
             to: request.to,
+            map: None,
         }
     }
 
@@ -439,6 +410,7 @@ fn citation(how: &Computation, inputs: &[Input]) -> String {
             min_coverage,
         } => format!("Regridded ({method}, cells covered by {min_coverage} at least)"),
         Computation::Correlation { .. } => "Correlated".to_owned(),
+        Computation::Statistic { statistic, .. } => format!("{statistic} of every cell"),
     };
     format!("{what}; {}", inputs.join("; "))
 }

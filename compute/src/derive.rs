@@ -29,6 +29,7 @@ pub(crate) use at_cell::counts_at_cell;
 use derivation::Derivation;
 use made_from::is_from_newer;
 use source::{SourceStep, steps_since};
+pub(crate) use statistic::StatisticRequest;
 pub use statistic::{derive_statistic, derive_statistics};
 
 /// How often the commit is tried again when another writer takes the number.

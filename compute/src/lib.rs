@@ -11,6 +11,7 @@ pub mod catalogue;
 pub mod check;
 pub mod cluster;
 pub mod computed;
+pub mod dependents;
 pub mod derive;
 mod error;
 pub mod expression;

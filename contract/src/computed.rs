@@ -1,13 +1,19 @@
 //! How a product was computed from others: enough to compute it again, and to cite it.
 
+mod map_request;
+
 use std::fmt::{Display, Formatter};
 use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
 use crate::ContractError;
+use crate::analysis::{CorrelationStatistic, MapStatistic};
 use crate::manifest::ManifestId;
+use crate::region::KeptRegion;
 use crate::time::{TimeMs, TimeStep};
+
+pub use map_request::MapRequest;
 
 /// A computation and what it read.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -23,6 +29,18 @@ pub struct Computed {
     /// First instant after the period that was asked for.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub to: Option<TimeMs>,
+    /// What else a statistic of every cell was asked with; absent of all else, and of correlations of before it was kept.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub map: Option<MapRequest>,
+}
+
+impl Computed {
+    /// Is it made anew by itself when there is a newer version of what it was made of?
+    pub fn follows(&self) -> bool {
+        let is_kept = |map: &MapRequest| map.region.as_ref().is_none_or(KeptRegion::is_whole);
+        let map = self.map.as_ref();
+        self.how.is_by_step() || map.is_some_and(|map| is_kept(map) && !map.once)
+    }
 }
 
 /// What is done in every cell, of every step or over all of them.
@@ -54,6 +72,15 @@ pub enum Computation {
         /// Share of the pairs that there could be that a cell must have, percent.
         least_percent: u8,
     },
+    /// A statistic over time of the one input: all of its steps make one of the result, or the few of a year, or, of anomalies, all.
+    Statistic {
+        /// Which.
+        statistic: MapStatistic,
+        /// Means that a trend is drawn through.
+        step: TimeStep,
+        /// Share of the time, or of a bin's steps, that must hold data for a cell to have a value, percent.
+        least_percent: u8,
+    },
 }
 
 impl Computation {
@@ -61,7 +88,7 @@ impl Computation {
     pub fn is_by_step(&self) -> bool {
         match self {
             Self::Expression { .. } | Self::Regrid { .. } => true,
-            Self::Correlation { .. } => false,
+            Self::Correlation { .. } | Self::Statistic { .. } => false,
         }
     }
 }
@@ -102,32 +129,6 @@ impl FromStr for Regridding {
             let valid = "use nearest, bilinear or conservative";
             ContractError::invalid("method of regridding", s, valid)
         })
-    }
-}
-
-/// What is said of the correlation of two products in a cell: a number of what is said of two series.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum CorrelationStatistic {
-    /// Pearson's.
-    Coefficient,
-    /// Chance of one as far from none where there is none, by the effective pairs.
-    PValue,
-    /// Pairs of values.
-    Pairs,
-    /// Pairs that are worth one of their own, as autocorrelation leaves them.
-    EffectivePairs,
-}
-
-impl CorrelationStatistic {
-    /// Name on the command line.
-    pub fn as_str(self) -> &'static str {
-        match self {
-            Self::Coefficient => "correlation",
-            Self::PValue => "correlation-p-value",
-            Self::Pairs => "correlation-pairs",
-            Self::EffectivePairs => "correlation-effective-pairs",
-        }
     }
 }
 
@@ -201,6 +202,23 @@ mod tests {
         let computed: Computed = serde_json::from_str(json).unwrap();
         assert_eq!(serde_json::to_string(&computed).unwrap(), json);
         assert!(!computed.how.is_by_step());
+        // Of before the rest of a request was kept.
+        assert!(computed.map.is_none() && !computed.follows());
+        let json = r#"{"how":{"kind":"correlation","statistic":"coefficient","lag_steps":0,"step":"month","deseasonalised":false,"least_percent":50},"inputs":[{"name":"first","manifest":"p@1-00000000"},{"name":"second","manifest":"q@2-00000000"}],"map":{"bins":"month"}}"#;
+        let computed: Computed = serde_json::from_str(json).unwrap();
+        assert_eq!(serde_json::to_string(&computed).unwrap(), json);
+        assert!(computed.follows());
+        let json = r#"{"how":{"kind":"statistic","statistic":"p97.5","step":"year","least_percent":80},"inputs":[{"name":"source","manifest":"p@1-00000000"}],"to":"2001-01-01T00:00:00Z","map":{"base":"1991/2020","bins":"season","region":{"name":"here","shape":{"box":"0,1,2,3"}},"once":true}}"#;
+        let mut computed: Computed = serde_json::from_str(json).unwrap();
+        assert_eq!(serde_json::to_string(&computed).unwrap(), json);
+        assert!(!computed.how.is_by_step() && !computed.follows());
+        let map = computed.map.as_mut().unwrap();
+        map.once = false;
+        assert!(computed.follows());
+        // The region has too many corners to have been kept.
+        let map = computed.map.as_mut().unwrap();
+        map.region = serde_json::from_str(r#"{"name":"here"}"#).unwrap();
+        assert!(!computed.follows());
     }
 
     #[test]

@@ -57,8 +57,8 @@ pub struct Manifest {
     pub series: Vec<SeriesSegment>,
     /// The manifest this one was derived from, if it was computed rather than ingested.
     pub derived_from: Option<ManifestId>,
-    /// How, if it was of several or by the step: by an expression, by regridding, as a correlation; `derived_from` is the first of its
-    /// inputs then.
+    /// How, if it was by an expression, by regridding, as a statistic or a correlation; `derived_from` is the first of its inputs then. Absent
+    /// of accumulated carbon, and of statistics of before it was kept.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub computed: Option<Computed>,
     /// Place of the steps' files in the order of notices; of steps without one nothing is known, and any file is newer.

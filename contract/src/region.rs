@@ -3,6 +3,7 @@
 mod asked;
 mod cells;
 mod collection;
+mod kept;
 mod mask;
 mod named;
 mod text;
@@ -13,6 +14,7 @@ use crate::ContractError;
 pub use asked::AskedRegion;
 pub use cells::Cells;
 pub use collection::{MAX_REGIONS, named_regions};
+pub use kept::{KeptRegion, MAX_KEPT_CORNERS};
 pub use mask::MaskCode;
 pub use named::{NAMED_REGIONS, NamedRegion};
 

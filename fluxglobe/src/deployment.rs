@@ -112,7 +112,9 @@ pub(crate) fn in_process(settings: &Settings, store: Store) -> Engine {
 /// The Ballista cluster of a scheduler.
 pub(crate) fn cluster(settings: &Settings, store: Store, scheduler: &str) -> Result<Engine> {
     let engine = Engine::cluster(store, scheduler.parse()?, least_parts(settings));
-    Ok(engine.with_query_limit(Duration::from_secs(settings.cluster_limit_s)))
+    let engine = engine.with_query_limit(Duration::from_secs(settings.cluster_limit_s));
+    // Statistics of every cell are computed where they are asked for.
+    Ok(engine.with_memory_bytes((settings.memory_mib as usize) << 20))
 }
 
 /// Parts of a query that a cluster is asked for at least; its scheduler makes as many as its executors have room for.

@@ -10,6 +10,7 @@ mod outages;
 mod refusals;
 mod restarts;
 mod round_trips;
+mod statistics;
 mod streams;
 mod watched;
 

@@ -9,6 +9,7 @@ mod bad_input;
 mod bench_serve;
 mod browser;
 mod circles;
+mod correlated;
 mod damaged;
 mod dependencies;
 mod end_to_end;

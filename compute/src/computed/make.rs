@@ -54,8 +54,8 @@ impl Maker {
                 regridder: Regridder::new(&job.grid, &job.target_grid, *method),
                 min_coverage: *min_coverage,
             },
-            Computation::Correlation { .. } => {
-                let reason = "a correlation is of all steps together: fluxglobe derive statistic";
+            Computation::Correlation { .. } | Computation::Statistic { .. } => {
+                let reason = "a statistic is of all steps together: fluxglobe derive statistic";
                 return Err(ComputeError::Expression {
                     reason: reason.to_owned(),
                 });

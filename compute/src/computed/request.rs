@@ -1,7 +1,8 @@
 //! What is asked of a computation: the product to land, what to do, and the products that it is done with.
 
-use contract::computed::{Computation, Matching};
+use contract::computed::{Computation, ComputedInput, Matching};
 use contract::grid::Grid;
+use contract::manifest::Manifest;
 use contract::product::ProductId;
 use contract::quantity::Quantity;
 use contract::time::TimeMs;
@@ -25,6 +26,29 @@ pub struct Request {
     pub from: Option<TimeMs>,
     /// First instant after the period.
     pub to: Option<TimeMs>,
+}
+
+impl Request {
+    /// The request that a computed version was made by; none of what was made in another way.
+    pub(crate) fn of(manifest: &Manifest) -> Option<Self> {
+        let computed = manifest.computed.as_ref();
+        let computed = computed.filter(|it| it.how.is_by_step())?;
+        let input = |input: &ComputedInput| RequestedInput {
+            name: input.name.clone(),
+            product: input.manifest.product.clone(),
+            matching: input.matching,
+        };
+        Some(Self {
+            target: manifest.product.clone(),
+            title: Some(manifest.title.clone()),
+            quantity: Some(manifest.quantity),
+            how: computed.how.clone(),
+            grid: Some(manifest.grid),
+            inputs: computed.inputs.iter().map(input).collect(),
+            from: computed.from,
+            to: computed.to,
+        })
+    }
 }
 
 /// A product under a name.

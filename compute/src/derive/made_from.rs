@@ -22,9 +22,8 @@ pub(super) fn is_from_newer(latest: &Manifest, derived: &Manifest) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use contract::computed::{
-        Computation, Computed, ComputedInput, CorrelationStatistic, Matching,
-    };
+    use contract::analysis::CorrelationStatistic;
+    use contract::computed::{Computation, Computed, ComputedInput, Matching};
     use contract::digest::Digest;
     use contract::grid::Grid;
     use contract::key::ObjectKey;
@@ -68,6 +67,7 @@ mod tests {
                 inputs,
                 from: None,
                 to: None,
+                map: None,
             }),
             notices: vec![],
             product,

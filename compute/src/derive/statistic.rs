@@ -3,6 +3,7 @@
 mod anomalies;
 mod blocks;
 mod cells;
+mod kept;
 mod landed;
 mod means;
 mod pairs;
@@ -16,7 +17,7 @@ mod wanted;
 
 use contract::ContractError;
 use contract::analysis::{MapOptions, MapStatistic};
-use contract::manifest::Manifest;
+use contract::manifest::{MANIFEST_SCHEMA, Manifest};
 use contract::product::ProductId;
 use contract::region::AskedRegion;
 use futures::future::BoxFuture;
@@ -25,6 +26,7 @@ use storage::manifests;
 use super::made_from::made_from;
 use super::{Progress, commit_with};
 use crate::{ComputeError, Engine};
+pub(crate) use kept::StatisticRequest;
 use landed::{Landing, computed};
 use plan::Plan;
 use sources::{Sources, SourcesOf};
@@ -52,7 +54,8 @@ pub fn derive_statistic<'a>(
 ///
 /// Correlations are with the newest version of another product. Cells of both are read once for all of them, in blocks over all time,
 /// as many at once as fit an eighth of the engine's memory, and computed on all processors: the same bits whatever their number. Where
-/// the newest version of a statistic was derived from the same steps in the same way, it is returned as it is. [`super::derived`] is the event to tell of each, after its manifest.
+/// the newest version of a statistic was derived from the same steps in the same way, its values are kept, and it is returned as it is where it says
+/// the same of how and of which versions it was made. [`super::derived`] is the event to tell of each, after its manifest.
 ///
 /// # Errors
 /// Steps that one cannot be made of, correlations with several products or one on another grid, a target that was not derived from the
@@ -88,11 +91,19 @@ pub fn derive_statistics<'a>(
             there,
         } in asked
         {
-            let computed = if there.is_some() { None } else { found.next() };
-            let Some(computed) = computed else {
-                made.extend(there);
-                continue;
+            let computed = match there {
+                Some(There::AsItIs(latest)) => {
+                    made.push(latest);
+                    continue;
+                }
+                Some(There::Renewed(renewed)) => {
+                    made.push(commit(engine, renewed).await?);
+                    continue;
+                }
+                None => found.next(),
             };
+            let none = || ComputeError::inconsistent("a statistic", "it was not computed");
+            let computed = computed.ok_or_else(none)?;
             let landing = Landing {
                 engine,
                 sources,
@@ -128,8 +139,17 @@ struct Asked<'a> {
     sources: SourcesOf<'a>,
     target: ProductId,
     plan: Plan,
-    /// Its newest version, if that is what would be derived.
-    there: Option<Manifest>,
+    /// Its newest version, if that has the values that would be derived.
+    there: Option<There>,
+}
+
+/// A version that has the values that would be derived.
+enum There {
+    /// It is what would be derived.
+    AsItIs(Manifest),
+    /// It says that it was made of other versions of the same steps, or does not keep the same request; the same values under
+    /// what is to be said, with number 0.
+    Renewed(Manifest),
 }
 
 impl<'a> Asked<'a> {
@@ -150,10 +170,14 @@ impl<'a> Asked<'a> {
                 );
                 return Err(ContractError::invalid("product", target.as_str(), reason).into());
             }
-            if plan.is_up_to_date(&latest, sources.first) {
-                // Whoever published it may have been killed before the cube followed.
-                cube::keep_up(engine.store(), &latest).await;
-                there = Some(latest);
+            if plan.has_values_of(&latest, sources.first) {
+                there = Some(if plan.is_said_by(&latest, sources.first) {
+                    // Whoever published it may have been killed before the cube followed.
+                    cube::keep_up(engine.store(), &latest).await;
+                    There::AsItIs(latest)
+                } else {
+                    There::Renewed(renewed(latest, sources, &plan))
+                });
             }
         }
         Ok(Self {
@@ -162,5 +186,20 @@ impl<'a> Asked<'a> {
             plan,
             there,
         })
+    }
+}
+
+/// A version with the same values, saying what they are made of now; its number is 0.
+fn renewed(latest: Manifest, sources: SourcesOf<'_>, plan: &Plan) -> Manifest {
+    Manifest {
+        schema: MANIFEST_SCHEMA,
+        number: 0,
+        title: format!("{}, {}", sources.title(), plan.title),
+        synthetic: sources.is_synthetic(),
+        source: sources.citation(),
+        series: vec![],
+        derived_from: Some(sources.first.id()),
+        computed: Some(plan.computed.clone()),
+        ..latest
     }
 }

@@ -13,7 +13,6 @@ use async_trait::async_trait;
 use contract::event::{Body, Event, RejectReason};
 use contract::manifest::{Manifest, ManifestId};
 use contract::product::ProductId;
-use contract::quantity::Quantity;
 use contract::topic::{Origin, Topic};
 use futures::future::BoxFuture;
 use prometheus::Registry;
@@ -21,9 +20,9 @@ use storage::StorageError;
 use storage::log::{EventLog, Finished, Message, Reader};
 
 use super::named_sums::NamedSums;
-use crate::computed::follow;
-use crate::derive::{chosen_start, derived};
-use crate::{ComputeError, Engine, ErrorClass, catalogue, derive_accumulated};
+use crate::dependents::follow;
+use crate::derive::derived;
+use crate::{ComputeError, Engine, ErrorClass};
 
 /// Derivers of this group share the products among them.
 pub const GROUP: &str = "derive";
@@ -158,7 +157,7 @@ impl Deriver {
     ) -> Option<Vec<Manifest>> {
         let running = self.red.start("derive");
         let _sums_wait = self.sums.hold().await;
-        let attempt = || self.derived_now(product);
+        let attempt = || follow(&self.engine, product);
         let derived = until_there("derivation", stop, ComputeError::is_retryable, attempt).await;
         for (_, event) in events {
             match &derived {
@@ -191,29 +190,6 @@ impl Deriver {
             }
         }
     }
-
-    /// Accumulated carbon of a flux, products that were computed from it, and the accumulated carbon of those.
-    async fn derived_now(&self, product: &ProductId) -> Result<Vec<Manifest>, ComputeError> {
-        let source = catalogue::product(self.engine.store(), product).await?;
-        let mut made = self.accumulated(&source).await?;
-        for computed in follow(&self.engine, product).await? {
-            let accumulated = self.accumulated(&computed).await?;
-            made.push(computed);
-            made.extend(accumulated);
-        }
-        Ok(made)
-    }
-
-    async fn accumulated(&self, source: &Manifest) -> Result<Vec<Manifest>, ComputeError> {
-        if source.quantity != Quantity::CarbonFlux {
-            return Ok(vec![]);
-        }
-        // A start that somebody chose stays as long as the product does.
-        let (engine, product) = (&self.engine, &source.product);
-        let start = chosen_start(engine.store(), product).await?;
-        let derived = derive_accumulated(engine, product, start, &|_progress| ()).await?;
-        Ok(vec![derived])
-    }
 }
 
 #[async_trait]
@@ -231,15 +207,20 @@ fn landed_in(event: &Event) -> Option<ProductId> {
     }
 }
 
-/// Versions that something was derived from.
+/// Versions of fluxes whose carbon was accumulated: those that budgets are of.
 fn touched(done: &[Finished]) -> BTreeSet<ManifestId> {
     let follows = done.iter().flat_map(|finished| &finished.follows);
-    follows
-        .filter_map(|event| match &event.body {
-            Body::ProductDerived { derived_from, .. } => Some(derived_from.clone()),
-            _ => None,
-        })
-        .collect()
+    let flux = |event: &Event| match &event.body {
+        Body::ProductDerived {
+            manifest,
+            derived_from,
+        } => {
+            let accumulated = derived_from.product.accumulated().ok()?;
+            (accumulated == manifest.product).then(|| derived_from.clone())
+        }
+        _ => None,
+    };
+    follows.filter_map(flux).collect()
 }
 
 fn finished(origin: Origin, follows: Vec<Event>) -> Finished {

@@ -422,7 +422,7 @@ async fn what_was_computed_follows_its_inputs_and_what_follows_it() {
     let follow = |name: &'static str| {
         let engine = engine.clone();
         async move {
-            compute::computed::follow(&engine, &product(name))
+            compute::dependents::follow(&engine, &product(name))
                 .await
                 .unwrap()
         }

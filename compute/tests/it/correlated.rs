@@ -1,13 +1,15 @@
 //! Two products correlated cell by cell, as products: each cell what the two series of that cell say.
 
 use compute::analysis::correlation as of_series;
-use compute::computed::{Request, RequestedInput, compute, follow};
+use compute::computed::{Request, RequestedInput, compute};
+use compute::dependents::follow;
 use compute::derive::derive_statistics;
 use compute::{ComputeError, Engine, ErrorClass};
 use contract::analysis::{
-    CorrelationQuery, CorrelationRow, MapCorrelation, MapOptions, MapStatistic, SeriesQuery,
+    CorrelationQuery, CorrelationRow, CorrelationStatistic, MapCorrelation, MapOptions,
+    MapStatistic, SeriesQuery,
 };
-use contract::computed::{Computation, CorrelationStatistic, Matching};
+use contract::computed::{Computation, Matching};
 use contract::grid::{Grid, LonLatDeg};
 use contract::manifest::Manifest;
 use contract::quantity::Quantity;
@@ -298,7 +300,8 @@ async fn parts_memory_regions_and_company_change_no_bit() {
     );
     let mut made = derived(&engine, &options).await.unwrap();
     let other = made.remove(3);
-    assert!(made.remove(1).computed.is_none());
+    let trend = made.remove(1).computed.unwrap();
+    assert_eq!(trend.inputs.len(), 1, "it is of one product");
     assert!(is_same(&maps(&store, &made).await, &expected));
     assert!(!is_same(&maps(&store, &[other]).await, &expected[..1]));
     // Of a region its cells alone: one whose middle lies outside too.
@@ -317,14 +320,17 @@ async fn parts_memory_regions_and_company_change_no_bit() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn it_is_up_to_date_while_both_products_are_and_follows_neither_by_itself() {
+async fn it_is_up_to_date_while_both_products_are_and_asked_for_once_follows_neither() {
     let (_folder, store) = folder_store();
     let [a, b] = landed(&store).await;
     let engine = Engine::in_process(store.clone(), parts(2));
-    let options = [MapOptions::of_two(
-        CorrelationStatistic::Coefficient,
-        MapCorrelation::new(product("wind")),
-    )];
+    let options = [MapOptions {
+        once: true,
+        ..MapOptions::of_two(
+            CorrelationStatistic::Coefficient,
+            MapCorrelation::new(product("wind")),
+        )
+    }];
     let made = derived(&engine, &options).await.unwrap().remove(0);
     let again = derived(&engine, &options).await.unwrap().remove(0);
     assert_eq!(again, made);

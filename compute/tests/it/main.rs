@@ -29,6 +29,8 @@ mod flight_sql;
 #[cfg(test)]
 mod fluxengine;
 #[cfg(test)]
+mod followed;
+#[cfg(test)]
 mod frozen;
 #[cfg(test)]
 mod history;

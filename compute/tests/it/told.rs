@@ -4,8 +4,10 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use compute::Engine;
+use compute::derive::derive_statistic;
 use compute::service::Deriver;
 use compute::service::deriver::GROUP;
+use contract::analysis::{MapOptions, MapStatistic};
 use contract::digest::Digest;
 use contract::event::{Body, Event, RejectReason};
 use contract::grid::Grid;
@@ -130,4 +132,42 @@ async fn what_cannot_be_understood_or_derived_from_does_not_hold_up_the_rest() {
     };
     assert_eq!(reason, RejectReason::Message);
     assert_eq!(origin.unwrap().to_string(), "granule.landed/0/0");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_statistic_is_made_anew_and_told_of_when_something_lands_in_what_it_is_of() {
+    let year = wavy_year(&COARSE);
+    let (_folder, store) = folder_store();
+    let log: Arc<dyn EventLog> = Arc::new(EmbeddedLog::memory());
+    let (id, sst) = (product("sst"), Quantity::SeaSurfaceTemperature);
+    land(&store, &id, sst, COARSE, &year[..2]).await;
+    let engine = Engine::local(store.clone());
+    let options = MapOptions::new(MapStatistic::Mean);
+    derive_statistic(&engine, &id, &options, &|_| ())
+        .await
+        .unwrap();
+    // Two that land together are one version of it, told of after each.
+    for months in 3..=4 {
+        let manifest = land(&store, &id, sst, COARSE, &year[..months]).await;
+        let event = landed(&format!("t{months}"), &manifest);
+        log.append(&[event]).await.unwrap();
+    }
+    derive_until_idle(&store, &log).await;
+    let told = derived(&*log).await;
+    let traces: Vec<_> = told.iter().map(|(trace, _)| trace.as_str()).collect();
+    assert_eq!(traces, ["t3", "t4"]);
+    for (_, body) in told {
+        let Body::ProductDerived {
+            manifest,
+            derived_from,
+        } = body
+        else {
+            panic!("{body:?}")
+        };
+        assert_eq!(
+            (manifest.product.as_str(), manifest.number),
+            ("sst-mean", 2)
+        );
+        assert_eq!((derived_from.product, derived_from.number), (id.clone(), 3));
+    }
 }

@@ -65,7 +65,7 @@ pub struct PagedManifest {
     pub domain: ObjectKey,
     /// The manifest this one was derived from, if it was computed rather than ingested.
     pub derived_from: Option<ManifestId>,
-    /// How, if it was by an expression, by regridding or as a correlation.
+    /// How, if it was by an expression, by regridding, as a statistic or a correlation.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub computed: Option<Computed>,
 }

@@ -12,7 +12,7 @@ use contract::time::{TimeMs, TimeStep};
 use super::steps::STEPS;
 
 /// What the long help ends with.
-const CORRELATIONS: &str = "\
+const MORE: &str = "\
 How two products go together in each cell, over the months that both have:
 
   fluxglobe derive statistic --product sst --with wind --deseasonalise \\
@@ -23,13 +23,17 @@ Pearson's r, -1 to 1; p by effective pairs, which allow for autocorrelation (Bre
 1999); pairs of months, each of which holds data in half of its time. Seasons alone make most
 pairs of products go together: --deseasonalise takes them off first. With --lag 2 the second is
 read two months after the first, with --lag=-2 before it; give maps of several lags a --name each.
-Both lie on one grid: `fluxglobe derive regrid` brings one to that of the other. What a map was
-made from, both versions, is in its manifest (`computed`); asked again it is made anew if there is
-a newer version of either, and by itself never.";
+Both lie on one grid: `fluxglobe derive regrid` brings one to that of the other.
+
+What a statistic was made from and how it was asked for is in its manifest (`computed`). When there is a
+newer version of that, of either of two, the deriver of a cluster (in the scheduler's process) makes it
+anew, with all else that was made from it; asked again, the same is done at once. Steps that come are
+read too where --to leaves that open; a region stays what it was. One that is made with --once stays as
+it is until it is asked for again.";
 
 /// `fluxglobe derive statistic`.
 #[derive(Debug, Args)]
-#[command(after_long_help = CORRELATIONS)]
+#[command(after_long_help = MORE)]
 pub(crate) struct DeriveStatistic {
     /// Product, of any quantity.
     #[arg(long)]
@@ -83,6 +87,9 @@ pub(crate) struct DeriveStatistic {
     /// PRODUCT-STATISTIC-WITH of correlations, and -REGION after it where that is a named one.
     #[arg(long, value_name = "PRODUCT")]
     pub(crate) name: Option<ProductId>,
+    /// Made of the versions that are there now, and by itself of none after them.
+    #[arg(long)]
+    pub(crate) once: bool,
     #[command(flatten, next_help_heading = "Kafka")]
     pub(crate) kafka: kafka_log::KafkaSettings,
 }
@@ -145,6 +152,7 @@ impl DeriveStatistic {
                 correlation: correlation.clone().filter(|_| statistic.is_of_two()),
                 region: region.cloned(),
                 name,
+                once: self.once,
                 ..MapOptions::new(*statistic)
             })
         };

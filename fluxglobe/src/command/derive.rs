@@ -210,6 +210,9 @@ async fn statistic(settings: &Settings, options: &DeriveStatistic) -> Result<()>
     progress::done(&bar, &outcomes.join(", "));
     for manifest in &made {
         tell(log.as_deref(), manifest).await?;
+        if let Some(line) = compute::dependents::why_it_stays(manifest) {
+            progress::say(&line);
+        }
         progress::result(&manifest.id().to_string())?;
     }
     Ok(())

@@ -3,6 +3,7 @@
 use anyhow::Result;
 use comfy_table::Table;
 use comfy_table::presets::NOTHING;
+use compute::dependents::why_it_stays;
 use contract::listing::ListedProduct;
 use contract::time::TimeMs;
 
@@ -53,11 +54,12 @@ fn codes(row: &ListedProduct) -> Option<String> {
 
 pub(crate) async fn run(settings: &Settings, options: &Products) -> Result<()> {
     let store = deployment::store(settings)?;
-    let mut rows = vec![];
+    let (mut rows, mut staying) = (vec![], vec![]);
     for product in storage::manifests::products(&store).await? {
         let Some(manifest) = storage::manifests::latest(&store, &product).await? else {
             continue;
         };
+        staying.extend(why_it_stays(&manifest));
         rows.push(ListedProduct::of(&manifest, manifest.id()));
     }
     if options.json {
@@ -95,7 +97,7 @@ pub(crate) async fn run(settings: &Settings, options: &Products) -> Result<()> {
         ]);
     }
     progress::result(&table.to_string())?;
-    for line in &besides {
+    for line in besides.iter().chain(&staying) {
         progress::say(line);
     }
     Ok(())

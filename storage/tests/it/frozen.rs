@@ -4,6 +4,7 @@
 
 mod jobs;
 mod kinds;
+mod made;
 mod told;
 
 use std::path::{Path, PathBuf};

@@ -6,8 +6,9 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use contract::analysis::{CorrelationRow, LeastSquaresTrend, MannKendall, MapStatistic, Season};
-use contract::computed::CorrelationStatistic;
+use contract::analysis::{
+    CorrelationRow, CorrelationStatistic, LeastSquaresTrend, MannKendall, MapStatistic, Season,
+};
 use contract::statistics::Percentile;
 use contract::time::{Period, TimeStep};
 

@@ -4,8 +4,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use contract::ContractError;
-use contract::analysis::MapStatistic;
-use contract::computed::CorrelationStatistic;
+use contract::analysis::{CorrelationStatistic, MapStatistic};
 use contract::manifest::{MANIFEST_SCHEMA, Manifest, Step};
 use contract::product::ProductId;
 use contract::time::Period;
@@ -196,7 +195,7 @@ impl Landing<'_> {
             domain: domain::write(self.engine.store(), target, &found.cells).await?,
             series: vec![],
             derived_from: Some(source.id()),
-            computed: plan.computed.clone(),
+            computed: Some(plan.computed.clone()),
             notices: vec![],
         })
     }

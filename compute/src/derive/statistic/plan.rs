@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use contract::ContractError;
 use contract::analysis::{AnalysisOptions, BasePeriod, CalendarBins, MapOptions, MapStatistic};
-use contract::computed::{Computation, Computed, ComputedInput, Matching};
+use contract::computed::Computed;
 use contract::digest::Digest;
 use contract::key::ObjectKey;
 use contract::manifest::{Manifest, Step};
@@ -14,6 +14,7 @@ use contract::region::Region;
 use contract::time::{Period, TimeStep};
 use serde::Serialize;
 
+use super::kept::computed;
 use super::means::MeanOf;
 use super::pairs::Pairs;
 use super::parts_of_year::PartsOfYear;
@@ -62,8 +63,8 @@ pub(super) struct Plan {
     pub(super) step: TimeStep,
     /// What a correlation is made by.
     pub(super) pairs: Option<Pairs>,
-    /// How, of what is of two products.
-    pub(super) computed: Option<Computed>,
+    /// How, and of what.
+    pub(super) computed: Computed,
     /// Index of the first step that is read, and of the first one after.
     pub(super) read: Range<usize>,
     /// Means that the normals of anomalies are made of; none where steps are taken as they are.
@@ -143,13 +144,18 @@ impl Plan {
         }
     }
 
-    /// Was a version made of these very steps in this very way?
-    pub(super) fn is_up_to_date(&self, latest: &Manifest, source: &Manifest) -> bool {
+    /// Was a version made of these very steps in this very way, so that its values are those that would be made?
+    pub(super) fn has_values_of(&self, latest: &Manifest, source: &Manifest) -> bool {
         let made_of = latest.steps.iter().map(|step| step.raw_sha256);
-        latest.derived_from.as_ref() == Some(&source.id())
-            && latest.computed == self.computed
+        latest.grid == source.grid
             && latest.quantity.is_same_kind(self.quantity)
             && made_of.eq(self.outputs.iter().map(|output| output.made_of))
+    }
+
+    /// Does a version say that it was made of these versions, as it is asked for now?
+    pub(super) fn is_said_by(&self, latest: &Manifest, source: &Manifest) -> bool {
+        latest.derived_from.as_ref() == Some(&source.id())
+            && latest.computed.as_ref() == Some(&self.computed)
     }
 }
 
@@ -164,34 +170,6 @@ fn pairs(
     };
     let reads = [ranges.read.clone(), inside(second, options)?];
     Pairs::of([sources.first, second], reads, options, asked).map(Some)
-}
-
-/// How something of two products was made, and of what.
-fn computed(sources: SourcesOf<'_>, options: &MapOptions) -> Option<Computed> {
-    let (MapStatistic::Correlation(statistic), Some(second), Some(asked)) =
-        (options.statistic, sources.second, &options.correlation)
-    else {
-        return None;
-    };
-    let input = |(name, manifest): (&str, &Manifest)| ComputedInput {
-        name: name.to_owned(),
-        manifest: manifest.id(),
-        matching: Matching::SamePeriod,
-    };
-    Some(Computed {
-        how: Computation::Correlation {
-            statistic,
-            lag_steps: asked.lag_steps,
-            step: options.step,
-            deseasonalised: asked.deseasonalise,
-            least_percent: options.least_percent,
-        },
-        inputs: [("first", sources.first), ("second", second)]
-            .map(input)
-            .into(),
-        from: options.from,
-        to: options.to,
-    })
 }
 
 /// What a title says after that of the product.

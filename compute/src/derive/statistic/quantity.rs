@@ -1,8 +1,8 @@
 //! What the values of a statistic are, and how they come from those of the product.
 
 use contract::ContractError;
+use contract::analysis::CorrelationStatistic;
 use contract::analysis::MapStatistic;
-use contract::computed::CorrelationStatistic;
 use contract::quantity::{MAX_TITLE_BYTES, Quantity};
 
 /// Years in a decade.

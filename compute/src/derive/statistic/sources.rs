@@ -114,7 +114,8 @@ impl SourcesOf<'_> {
         format!("Correlated; {}; {}", of(self.first), of(second))
     }
 
-    fn all(&self) -> impl Iterator<Item = &Manifest> {
+    /// All of them, the first product's first.
+    pub(super) fn all(&self) -> impl Iterator<Item = &Manifest> {
         std::iter::once(self.first).chain(self.second)
     }
 }
