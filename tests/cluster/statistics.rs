@@ -60,5 +60,5 @@ fn the_deriver_makes_a_map_anew_when_a_month_lands_and_leaves_one_that_was_asked
         "--json",
     ];
     let answer: Value = serde_json::from_str(&cluster.succeed(&point).unwrap()).unwrap();
-    assert_eq!(answer["rows"][0]["values"]["mean"], 3.0, "{answer}");
+    assert_eq!(answer["series"][0]["value"], 3.0, "{answer}");
 }

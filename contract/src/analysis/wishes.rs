@@ -267,4 +267,45 @@ mod tests {
         let whole = HovmollerWishes::default().query("sst".parse().unwrap(), Along::Lat);
         assert_eq!(whole.unwrap().bounds_deg, None);
     }
+
+    #[test]
+    fn what_is_asked_is_in_the_question() {
+        let asked = AnalysisWishes {
+            parts: vec![AnalysisPart::Trend],
+            base: "1991/2000".parse().ok(),
+            bins: Some(CalendarBins::Season),
+            trend_step: Some(TimeStep::Year),
+            min_coverage: "7".parse().ok(),
+        };
+        let options = asked.clone().options().unwrap();
+        assert_eq!(
+            (options.base, options.bins),
+            (asked.base, CalendarBins::Season)
+        );
+        assert_eq!(options.trend_step, TimeStep::Year);
+        assert_eq!(Some(options.min_coverage), asked.min_coverage);
+        let compared = CorrelationWishes {
+            step: Some(TimeStep::Year),
+            deseasonalise: Some(true),
+            max_lag: Some(3),
+        };
+        let query = compared.query(series(), "ice".parse().unwrap()).unwrap();
+        let how = (query.step, query.deseasonalise, query.max_lag);
+        assert_eq!(how, (TimeStep::Year, true, 3));
+        let taken = SeriesWishes {
+            region: Some("14n-50n".parse().unwrap()),
+            from: "2001".parse().ok(),
+            to: "2002".parse().ok(),
+            earth: Some(Earth::Sphere),
+            ..SeriesWishes::default()
+        };
+        let window = (taken.from, taken.to);
+        let Some(SeriesQuery::Region(query)) = taken.query("sst".parse().unwrap()) else {
+            panic!("no region");
+        };
+        assert_eq!(
+            ((query.from, query.to), query.earth),
+            (window, Earth::Sphere)
+        );
+    }
 }

@@ -57,4 +57,22 @@ mod tests {
         let usual = BudgetQuery::new(product.clone(), "global".parse().unwrap());
         assert_eq!(BudgetWishes::default().query(product), usual);
     }
+
+    #[test]
+    fn what_is_asked_is_in_the_question() {
+        let wishes = BudgetWishes {
+            region: Some("14n-50n".parse().unwrap()),
+            from: "2001".parse().ok(),
+            to: "2002".parse().ok(),
+            step: Some(TimeStep::Month),
+            earth: Some(Earth::Sphere),
+            cells: Some(Cells::OceanShare),
+            ocean: None,
+        };
+        let query = wishes.clone().query("flux".parse().unwrap());
+        assert_eq!((query.from, query.to), (wishes.from, wishes.to));
+        assert_eq!(query.region_name, "14n-50n");
+        let how = (query.step, query.earth, query.cells);
+        assert_eq!(how, (TimeStep::Month, Earth::Sphere, Cells::OceanShare));
+    }
 }

@@ -168,4 +168,49 @@ mod tests {
             assert!(!is_series(wishes));
         }
     }
+
+    #[test]
+    fn an_end_and_a_sampling_alone_ask_for_statistics_of_a_place_too() {
+        let place = LonLatDeg::new(-30.0, 10.0).unwrap();
+        for wishes in [
+            StatisticsWishes {
+                to: "2000".parse().ok(),
+                ..StatisticsWishes::default()
+            },
+            StatisticsWishes {
+                sampling: Some(Sampling::Cell),
+                ..StatisticsWishes::default()
+            },
+        ] {
+            let asked = wishes.clone().at_point(product(), place);
+            let PointQuestion::Statistics(query) = asked else {
+                panic!("a series");
+            };
+            assert_eq!(query.to, wishes.to);
+        }
+    }
+
+    #[test]
+    fn what_is_asked_is_in_the_question() {
+        let wishes = StatisticsWishes {
+            statistics: "max,p90".parse().ok(),
+            step: Some(TimeStep::Season),
+            min_coverage: "7".parse().ok(),
+            from: "2001".parse().ok(),
+            to: "2002".parse().ok(),
+            earth: Some(Earth::Sphere),
+            cells: Some(Cells::OceanShare),
+            ..StatisticsWishes::default()
+        };
+        let region: AskedRegion = "global".parse().unwrap();
+        let asked = wishes.clone().over_region(product(), region);
+        let RegionQuestion::Statistics(query) = asked else {
+            panic!("a series");
+        };
+        assert_eq!((query.from, query.to), (wishes.from, wishes.to));
+        let how = (query.step, query.earth, query.cells);
+        assert_eq!(how, (TimeStep::Season, Earth::Sphere, Cells::OceanShare));
+        assert_eq!(Some(query.statistics), wishes.statistics);
+        assert_eq!(Some(query.min_coverage), wishes.min_coverage);
+    }
 }

@@ -25,11 +25,11 @@ pairs of products go together: --deseasonalise takes them off first. With --lag 
 read two months after the first, with --lag=-2 before it; give maps of several lags a --name each.
 Both lie on one grid: `fluxglobe derive regrid` brings one to that of the other.
 
-What a statistic was made from and how it was asked for is in its manifest (`computed`). When there is a
-newer version of that, of either of two, the deriver of a cluster (in the scheduler's process) makes it
-anew, with all else that was made from it; asked again, the same is done at once. Steps that come are
-read too where --to leaves that open; a region stays what it was. One that is made with --once stays as
-it is until it is asked for again.";
+What a statistic was made from and how it was asked for is in its manifest (`computed`). When there
+is a newer version of that, of either of two, the deriver of a cluster (in the scheduler's process)
+makes it anew, with all else that was made from it; asked again, the same is done at once. Steps
+that come are read too where --to leaves that open; a region stays what it was. One that is made
+with --once stays as it is until it is asked for again.";
 
 /// `fluxglobe derive statistic`.
 #[derive(Debug, Args)]

@@ -162,6 +162,8 @@ fn a_task_has_steps_side_by_side_and_is_told_of_no_others() {
         let starts: Vec<u32> = starts.collect();
         let (first, last) = (starts[0], starts[starts.len() - 1]);
         assert!(starts.is_sorted() && first <= next, "{starts:?}");
+        // At most the last run of the task before goes on in this one.
+        assert!(next <= first + 5, "{starts:?} after {next}");
         next = last + 5;
         let Wanted::Histograms { ranges: own, steps } = &task.question.wanted else {
             panic!("another question");
