@@ -99,6 +99,7 @@ fn all() -> Vec<Manifest> {
     let request = MapRequest {
         base: Some(base),
         bins: CalendarBins::Season,
+        anomaly_step: None,
         region: Some(KeptRegion::of(&region)),
         once: true,
     };
