@@ -195,6 +195,33 @@ async fn a_few_cells_of_steps_that_no_run_holds_are_read_of_chunks_of_fields_or_
 }
 
 #[tokio::test]
+async fn a_few_cells_of_fields_alone_are_read_of_their_chunks_and_all_cells_of_whole_fields() {
+    let (steps, grid) = (months(20), grid(200, 300));
+    let store = Store::memory();
+    let manifest = version(&store, grid, 1, &steps).await;
+    let mut whole = 0;
+    for step in &manifest.steps {
+        whole += store.size_bytes(&step.field).await.unwrap();
+    }
+    let (store, traffic) = store.counted();
+    let found = Values::of(&store, &Arc::new(manifest)).await.unwrap();
+    assert_eq!(found.in_fields_count(), steps.len());
+    let before = traffic.counts();
+    let cell = found.cell(60, 120).await.unwrap();
+    assert_eq!(bits(&cell), bits(&series(&grid, &steps, 60, 120)));
+    let few = traffic.counts().since(before).read_bytes;
+    assert!(2 * few < whole, "{few} of {whole}");
+    let before = traffic.counts();
+    let across = grid.cols.div_ceil(BLOCK_CELLS);
+    let blocks = grid.rows.div_ceil(BLOCK_CELLS) * across;
+    let all: Vec<[u32; 2]> = (0..blocks).map(|at| [at / across, at % across]).collect();
+    found.blocks(&all, 0..steps.len()).await.unwrap();
+    // Each at once: chunk by chunk takes as many requests.
+    let all = traffic.counts().since(before);
+    assert_eq!((all.reads, all.read_bytes), (steps.len() as u64, whole));
+}
+
+#[tokio::test]
 async fn another_grid_begins_without_runs() {
     let store = Store::memory();
     let steps = months(RUN);
