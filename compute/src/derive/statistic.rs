@@ -97,7 +97,7 @@ pub fn derive_statistics<'a>(
                     continue;
                 }
                 Some(There::Renewed(renewed)) => {
-                    made.push(commit(engine, renewed).await?);
+                    made.push(commit_with(engine, renewed, None).await?);
                     continue;
                 }
                 None => found.next(),
