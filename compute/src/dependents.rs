@@ -42,8 +42,11 @@ pub fn follow<'a>(
         while let Some(next) = order.next() {
             // Where what it is made of was left, it is of what it was.
             let is_touched = |recipe: &Recipe| recipe.sources().any(|it| changed.contains(it));
-            let touched = next.values().filter(|recipe| is_touched(recipe));
-            let newest = make(engine, touched.collect()).await?;
+            let mut touched = vec![];
+            for (target, recipe) in next.iter().filter(|(_, recipe)| is_touched(recipe)) {
+                touched.extend(asked_now(engine.store(), target, recipe).await?);
+            }
+            let newest = make(engine, touched.iter().collect()).await?;
             changed.extend(newest.iter().map(|manifest| manifest.product.clone()));
             made.extend(newest);
             order.done(next.keys());
@@ -59,7 +62,7 @@ pub fn follow<'a>(
 async fn recipes(store: &Store) -> Result<BTreeMap<ProductId, Recipe>, ComputeError> {
     let mut recipes = BTreeMap::new();
     for product in manifests::products(store).await? {
-        let Some(latest) = manifests::latest(store, &product).await? else {
+        let Some(latest) = newest(store, &product).await? else {
             continue;
         };
         if let Some(target) = product
@@ -76,6 +79,28 @@ async fn recipes(store: &Store) -> Result<BTreeMap<ProductId, Recipe>, ComputeEr
         }
     }
     Ok(recipes)
+}
+
+/// The newest manifest of a product; none of one that cannot be read, which is told of: all others can be made.
+async fn newest(store: &Store, product: &ProductId) -> Result<Option<Manifest>, ComputeError> {
+    let latest = manifests::latest(store, product).await;
+    Ok(told(product, latest.map_err(ComputeError::from))?.flatten())
+}
+
+/// How a product is made by its newest version: somebody may have asked for it otherwise while others were made. None if it is to stay.
+async fn asked_now(
+    store: &Store,
+    target: &ProductId,
+    recipe: &Recipe,
+) -> Result<Option<Recipe>, ComputeError> {
+    if let Recipe::Accumulated(source) = recipe {
+        return Ok(Some(Recipe::Accumulated(source.clone())));
+    }
+    let Some(latest) = newest(store, target).await? else {
+        return Ok(None);
+    };
+    let asked = Recipe::of(&latest).map_err(ComputeError::from);
+    Ok(told(target, asked)?.flatten())
 }
 
 /// Is carbon accumulated of it? Of a flux that landed or was computed, and of no mean of one.

@@ -331,7 +331,7 @@ fn assert_answered(load: Load, cluster: &Cluster) {
 fn refusals(cluster: &Cluster) -> String {
     let servers = cluster.nodes.values();
     let servers = servers.filter(|node| node.name.starts_with("tile-server"));
-    let said = servers.map(|node| node.said()).collect::<String>();
+    let said = servers.map(harness::node::Node::said).collect::<String>();
     let failed = said
         .lines()
         .filter(|line| line.contains("a request failed"));

@@ -8,6 +8,7 @@ use contract::analysis::{BasePeriod, MapStatistic};
 use contract::analysis::{CalendarBins, CorrelationStatistic, MapCorrelation, MapOptions};
 use contract::computed::{Computation, Matching};
 use contract::grid::Grid;
+use contract::key::ObjectKey;
 use contract::manifest::Manifest;
 use contract::product::ProductId;
 use contract::quantity::Quantity;
@@ -354,6 +355,23 @@ async fn a_newer_version_of_the_same_steps_is_said_and_not_computed() {
         followed(&engine, "sst").await,
         [("sst-climatology".to_owned(), 2)]
     );
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_version_of_another_product_that_cannot_be_read_stops_nothing() {
+    let (_folder, store) = folder_store();
+    landed(&store, "sst", 24, 1).await;
+    let other = landed(&store, "other", 2, 1).await;
+    let engine = Engine::in_process(store.clone(), parts(2));
+    let mean = MapOptions::new(MapStatistic::Mean);
+    derive_statistic(&engine, &product("sst"), &mean, &|_| ())
+        .await
+        .unwrap();
+    let key = ObjectKey::manifest(&other.product, other.number);
+    store.put_over(&key, "no manifest".into()).await.unwrap();
+    landed(&store, "sst", 30, 1).await;
+    let expected = [("sst-mean".to_owned(), 2)];
+    assert_eq!(followed(&engine, "sst").await, expected);
 }
 
 /// A version as programs wrote it that did not keep how it was asked for.

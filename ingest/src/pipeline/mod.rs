@@ -12,6 +12,7 @@ use contract::event::RejectReason;
 use contract::manifest::Manifest;
 use contract::masked::MaskedCells;
 use contract::notice::NoticeOrder;
+use contract::quantity::Quantity;
 use contract::time::Period;
 use storage::{StorageError, Store, manifests};
 
@@ -249,8 +250,8 @@ impl Pipeline<'_> {
 }
 
 /// Is this very file in the product, or are files of later notices in all of its places? With a profile of the caller's
-/// own it is decoded all the same, since the same bytes may mean other values by it; so is one whose codes mean what the product
-/// does not say.
+/// own it is decoded all the same, since the same bytes may mean other values by it; so is one that says what codes mean where
+/// the product says nothing.
 fn unchanged(
     newest: &Manifest,
     planned: &PlannedGranule,
@@ -258,9 +259,11 @@ fn unchanged(
     place: NoticeOrder,
 ) -> Option<(Versioned, Unchanged)> {
     let joined = newest.quantity.joined(planned.plan.target.quantity);
+    let says_more =
+        |joined: Quantity| newest.quantity.flags().is_empty() && !joined.flags().is_empty();
     if wish.profile.is_some()
         || planned.plan.steps.is_empty()
-        || joined.is_none_or(|joined| joined.flags() != newest.quantity.flags())
+        || joined.is_none_or(says_more)
         || newest.grid != planned.plan.mapping.grid
     {
         return None;

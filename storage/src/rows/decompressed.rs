@@ -17,6 +17,9 @@ thread_local! {
     static OF_THREAD: Cell<Option<Decompressor<'static>>> = const { Cell::new(None) };
 }
 
+/// Most bytes of a page, whatever the end of its file says: a row of an array is one, of some 7,000 numbers.
+const MOST_BYTES: usize = 16 << 20;
+
 /// A column whose pages are handed out as they are stored, and are to be decompressed by [`page`]; none if another codec compressed it.
 pub(super) fn as_stored(column: &ColumnChunkMetaData) -> Option<ColumnChunkMetaData> {
     let Compression::ZSTD(_) = column.compression() else {
@@ -29,10 +32,10 @@ pub(super) fn as_stored(column: &ColumnChunkMetaData) -> Option<ColumnChunkMetaD
 /// A page of a column, decompressed.
 ///
 /// # Errors
-/// It is damaged, or larger than its whole column says it is.
+/// It is damaged, or larger than its whole column says it is, or than any page.
 pub(super) fn page(content: &[u8], column: &ColumnChunkMetaData) -> Result<Bytes> {
     let other = |e: std::io::Error| ParquetError::General(e.to_string());
-    let most = usize::try_from(column.uncompressed_size())?;
+    let most = usize::try_from(column.uncompressed_size())?.min(MOST_BYTES);
     let told = get_frame_content_size(content).ok().flatten();
     let size = told.map_or(Ok(most), usize::try_from)?;
     if size > most {

@@ -16,6 +16,8 @@ use crate::Store;
 
 /// Parts that are held, bytes of all together.
 const HELD_BYTES: u64 = 64 << 20;
+/// What an entry takes besides its path and its bytes.
+const ENTRY_BYTES: u64 = 192;
 /// Of so many bytes each, to begin with.
 const PART_BYTES: u64 = 64 << 10;
 
@@ -27,7 +29,7 @@ struct PartWeight;
 
 impl Weighter<Part, Bytes> for PartWeight {
     fn weight(&self, (path, _range): &Part, content: &Bytes) -> u64 {
-        (path.len() + content.len()) as u64
+        (path.len() + content.len()) as u64 + ENTRY_BYTES
     }
 }
 

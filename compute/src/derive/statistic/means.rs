@@ -19,11 +19,21 @@ pub(super) struct MeanOf {
 }
 
 /// What a mean has come to, its steps added in the order of time.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy)]
 pub(super) struct Sum {
     /// Values times seconds.
     values_s: f64,
     with_data_s: f64,
+}
+
+impl Default for Sum {
+    fn default() -> Self {
+        Self {
+            // Whatever is added to it stays what it is, -0.0 too.
+            values_s: -0.0,
+            with_data_s: 0.0,
+        }
+    }
 }
 
 impl MeanOf {

@@ -120,14 +120,15 @@ pub(super) fn merge(newest: Option<&Manifest>, granules: &[StoredGranule]) -> Me
     merged
 }
 
-/// A file whose values are there and that says more of what codes mean, which programs of before left out, is taken for that.
+/// A file whose values are there and that says what codes mean where the product says nothing, since programs of before left that out, is
+/// taken for it. Where it says something, files that say otherwise would take turns for ever.
 fn told_anew(
     change: Change,
     granule: &StoredGranule,
     before: Option<Quantity>,
     after: Quantity,
 ) -> Change {
-    let is_told = before.is_some_and(|before| before.flags() != after.flags());
+    let is_told = before.is_some_and(|it| it.flags().is_empty()) && !after.flags().is_empty();
     if change != Change::Same || !is_told {
         return change;
     }
