@@ -124,6 +124,11 @@ impl EncodedBlocks {
         &self.pieces
     }
 
+    /// Bytes of all of them as they are stored.
+    pub fn stored_bytes(&self) -> usize {
+        self.content.stored_bytes()
+    }
+
     /// Reads and decodes one block after the other, as they lie in their shards, and hands over its place among those asked for and its values, `[cell, step]` of 8 x 8
     /// cells and [`RUN_STEPS`](crate::RUN_STEPS) steps, stored unit, NaN no data; those without any data are left out. `rows` says of a block which of its rows of cells
     /// are wanted, a bit each, the northernmost lowest; values of others are any. `take` says whether to go on.

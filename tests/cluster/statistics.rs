@@ -14,7 +14,7 @@ const SMALL: Shape = Shape {
     executors: 1,
     ingestds: 1,
     render_workers: 0,
-    tile_servers: 0,
+    tile_servers: 1,
 };
 
 #[test]

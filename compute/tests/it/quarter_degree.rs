@@ -154,10 +154,11 @@ async fn read(
     let before = counting.bytes();
     statistics(engine, &of(degree.0)).await.unwrap();
     let read = counting.bytes() - before;
-    // Where they lie is known by now.
+    // Blocks that one question read are not read again for another one.
     let held = values.encoded(degree.1, 0..RUN_STEPS).await.unwrap();
-    assert!(held.is_some());
-    (read, counting.bytes() - before - read)
+    let stored_bytes = held.unwrap().stored_bytes() as u64;
+    assert_eq!(counting.bytes() - before, read);
+    (read, stored_bytes)
 }
 
 #[tokio::test(flavor = "multi_thread")]
