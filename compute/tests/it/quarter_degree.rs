@@ -166,7 +166,9 @@ async fn of_the_time_major_copy_a_degree_reads_its_blocks_and_once_where_they_li
     let (_folder, store, manifest) = landed(RUN_STEPS).await;
     assert_eq!(cube::compact(&store, "cubes/noise").await.unwrap(), 1);
     let engine = || {
-        let (counted, counting) = counted(&store, "cubes/");
+        // As another process opens it.
+        let own = Store::open(store.url()).unwrap();
+        let (counted, counting) = counted(&own, "cubes/");
         (Engine::in_process(counted, parts(1)), counting)
     };
     let (cold, counting) = engine();
