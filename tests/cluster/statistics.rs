@@ -13,7 +13,7 @@ const LIMIT: Duration = Duration::from_mins(2);
 const SMALL: Shape = Shape {
     executors: 1,
     ingestds: 1,
-    render_workers: 0,
+    render_workers: 1,
     tile_servers: 1,
 };
 
