@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 use contract::digest::Digest;
 use contract::event::{Body, Event};
 use harness::node::Node;
-use harness::servers::free_port;
+use test_data::free_port;
 
 use ground::Ground;
 

@@ -7,7 +7,7 @@ use harness::cluster::{Cluster, Shape};
 use harness::granule;
 use harness::node::Node;
 use harness::proxy::{Passed, rounds};
-use harness::servers::free_port;
+use test_data::free_port;
 
 use crate::alone;
 use crate::faults::{PRODUCT, notice, say, until_whole};

@@ -7,12 +7,13 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context as _, Result, bail, ensure};
 use tempfile::TempDir;
+use test_data::free_port;
 
 use crate::http::{self, Answer};
 use crate::node::Node;
 use crate::program;
 use crate::proxy::Proxy;
-use crate::servers::{Servers, free_port};
+use crate::servers::Servers;
 
 /// How many of each service.
 #[derive(Debug, Clone, Copy)]
@@ -195,7 +196,7 @@ impl Cluster {
         while start.elapsed() < limit {
             match ask(self) {
                 Ok(Some(found)) => return Ok(found),
-                Ok(None) => {}
+                Ok(None) => last = None,
                 Err(error) => last = Some(error),
             }
             std::thread::sleep(Duration::from_millis(100));

@@ -1,12 +1,11 @@
 //! Real servers (Kafka, PostGIS, S3, HDFS) of a test's own: on free ports, in its own folder, stopped when dropped.
 
-use std::net::TcpListener;
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
-use std::sync::Mutex;
 
 use anyhow::{Context as _, Result, ensure};
 use tempfile::TempDir;
+use test_data::free_port;
 
 /// Some of the servers of `deploy/services`.
 pub struct Servers {
@@ -14,25 +13,6 @@ pub struct Servers {
     folder: TempDir,
     told: Vec<(&'static str, String)>,
     settings: Vec<(String, String)>,
-}
-
-/// Ports taken by this process and not yet listened on: two tests must not be given the same one.
-static GIVEN: Mutex<Vec<u16>> = Mutex::new(vec![]);
-
-/// A port that is free and that no other caller in this process was given.
-pub fn free_port() -> u16 {
-    loop {
-        let listener = TcpListener::bind("127.0.0.1:0").expect("this machine has free ports");
-        let port = listener
-            .local_addr()
-            .expect("a bound socket has an address")
-            .port();
-        let mut given = GIVEN.lock().expect("nobody panics while holding it");
-        if !given.contains(&port) {
-            given.push(port);
-            return port;
-        }
-    }
 }
 
 impl Servers {

@@ -1,12 +1,12 @@
 //! A Kafka broker of a test's own, on its own port and folder, that can be killed and started again.
 
-use std::net::TcpListener;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use rdkafka::ClientConfig;
 use rdkafka::consumer::{BaseConsumer, Consumer as _};
 use std::time::{Duration, Instant};
+use test_data::free_port;
 
 /// Stopped and removed when dropped.
 pub(crate) struct Broker {
@@ -86,9 +86,4 @@ impl Drop for Broker {
 
 fn script() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../deploy/services/kafka.sh")
-}
-
-fn free_port() -> u16 {
-    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
-    listener.local_addr().unwrap().port()
 }

@@ -1,6 +1,5 @@
 //! TLS, client certificates and logins against a broker that asks for them.
 
-use std::net::TcpListener;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
@@ -8,6 +7,7 @@ use std::time::Duration;
 use kafka_log::{KafkaLog, KafkaSettings, SaslMechanism, Security, create_topics};
 use storage::StorageError;
 use storage::log::{EventLog as _, contents};
+use test_data::free_port;
 use tokio::time::Instant;
 
 use crate::events::{FROM, notice, paths};
@@ -29,7 +29,8 @@ impl GuardedBroker {
         let folder = tempfile::tempdir().unwrap();
         make_certificate(folder.path(), "broker");
         make_certificate(folder.path(), "stranger");
-        let [inner, login_port, certificate_port, controller] = free_ports();
+        let [inner, login_port, certificate_port, controller] =
+            std::array::from_fn(|_| free_port());
         let settings = folder.path().join("server.properties");
         let store = folder.path().display();
         let text = format!(
@@ -174,11 +175,6 @@ fn make_certificate(folder: &Path, name: &str) {
     );
     let both = [file("key"), file("crt")].map(|path| std::fs::read(path).unwrap());
     std::fs::write(file("pem"), both.concat()).unwrap();
-}
-
-fn free_ports() -> [u16; 4] {
-    let listeners = [(); 4].map(|()| TcpListener::bind("127.0.0.1:0").unwrap());
-    listeners.map(|listener| listener.local_addr().unwrap().port())
 }
 
 /// Makes topics, tells an event and reads it.

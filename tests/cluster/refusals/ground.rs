@@ -7,12 +7,13 @@ use std::time::{Duration, Instant};
 
 use contract::topic::Topic;
 use harness::node::Node;
-use harness::servers::{Servers, free_port};
+use harness::servers::Servers;
 use harness::{granule, program};
 use kafka_log::{KafkaLog, KafkaSettings};
 use serde_json::Value;
 use storage::log::EventLog as _;
 use tempfile::TempDir;
+use test_data::free_port;
 
 use super::{Bad, LIMIT, PRODUCT, files_below, refused_start, start, until};
 use crate::together;

@@ -4,8 +4,9 @@ use std::path::Path;
 use std::process::Command;
 
 use harness::program;
-use harness::servers::{Servers, free_port};
+use harness::servers::Servers;
 use serde_json::Value;
+use test_data::free_port;
 
 use super::{PRODUCT, refused_start, start, until};
 use crate::together;

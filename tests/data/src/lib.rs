@@ -1,6 +1,6 @@
 //! Where tests find files that nobody on this project made, and who may end without having run. What is missing is a
 //! failure, but for the tests on a named list, which need what not everybody can have: those say so, and `make test`
-//! counts them.
+//! counts them. And where servers of theirs may listen.
 //!
 //! | data | where | when missing |
 //! |---|---|---|
@@ -9,9 +9,12 @@
 #![expect(clippy::print_stderr, reason = "a test that does not run says so")]
 
 pub mod frozen;
+mod ports;
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
+
+pub use ports::free_port;
 
 /// Tests that may end without having run, a name a line.
 pub const LIST: &str = include_str!("../may-not-run.txt");
