@@ -83,6 +83,12 @@ pub trait EventLog: Send + Sync {
     /// Follows all messages of a topic alone, without leaving a trace of it.
     async fn follow(&self, topic: Topic, start: Start) -> Result<Box<dyn Follower>, StorageError>;
 
+    /// How long a follower of all messages waits for more before it has had those that were there: not at all where what is appended
+    /// can be read at once.
+    fn end_wait(&self) -> Duration {
+        END_WAIT
+    }
+
     /// One message, none if it is not there (any more).
     async fn message(&self, origin: Origin) -> Result<Option<Message>, StorageError>;
 
@@ -122,7 +128,7 @@ pub trait Follower: Send {
 
 /// Most messages that [`contents`] reads at once.
 const MESSAGES_AT_ONCE: usize = 256;
-/// A follower from the oldest message that brings nothing for so long is at the end.
+/// A follower from the oldest message that brings nothing for so long is at the end, in a log that others hold.
 const END_WAIT: Duration = Duration::from_millis(500);
 
 /// All messages of a topic that are there now.
@@ -130,7 +136,7 @@ pub async fn contents(log: &dyn EventLog, topic: Topic) -> Result<Vec<Message>, 
     let mut follower = log.follow(topic, Start::Oldest).await?;
     let mut all = vec![];
     loop {
-        let some = follower.next(MESSAGES_AT_ONCE, END_WAIT).await?;
+        let some = follower.next(MESSAGES_AT_ONCE, log.end_wait()).await?;
         if some.is_empty() {
             return Ok(all);
         }

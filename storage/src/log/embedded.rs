@@ -136,7 +136,8 @@ impl Shared {
             // Registered before looking, so that nothing appended in between is slept through.
             news.as_mut().enable();
             let found = look(&mut self.state());
-            if !found.is_empty() || tokio::time::timeout_at(until, news).await.is_err() {
+            let is_over = !found.is_empty() || wait.is_zero();
+            if is_over || tokio::time::timeout_at(until, news).await.is_err() {
                 return found;
             }
         }
@@ -220,6 +221,10 @@ impl EventLog for EmbeddedLog {
             topic,
             at,
         }))
+    }
+
+    fn end_wait(&self) -> Duration {
+        Duration::ZERO
     }
 
     async fn message(&self, origin: Origin) -> Result<Option<Message>, StorageError> {
@@ -396,7 +401,9 @@ fn failed(path: &Path, source: std::io::Error) -> StorageError {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::log::contents;
     use contract::event::Body;
+    use futures::FutureExt as _;
 
     fn notice(path: &str) -> Event {
         let body = Body::GranuleNotice {
@@ -441,6 +448,19 @@ mod tests {
         let log = EmbeddedLog::open(folder.path()).unwrap();
         assert_eq!(read(&log, "g").await, [notice("b")]);
         assert_eq!(log.lag(TOPIC, "g").await.unwrap(), 1);
+    }
+
+    #[tokio::test]
+    async fn all_messages_are_had_without_waiting_for_more() {
+        let folder = tempfile::tempdir().unwrap();
+        let log = EmbeddedLog::open(folder.path()).unwrap();
+        let many: Vec<Event> = (0..300).map(|at| notice(&at.to_string())).collect();
+        log.append(&many).await.unwrap();
+        let all = contents(&log, TOPIC).now_or_never();
+        let all = all.expect("nobody else appends").unwrap();
+        assert!(all.iter().map(|it| it.event().unwrap()).eq(many));
+        let none = contents(&log, Topic::RenderDone).now_or_never();
+        assert!(none.is_some_and(|none| none.unwrap().is_empty()));
     }
 
     #[tokio::test]
