@@ -24,12 +24,9 @@ struct Server {
 
 impl Server {
     fn start() -> Self {
-        let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
-        let port = listener.local_addr().unwrap().port();
-        drop(listener);
         let server = Self {
             run: tempfile::tempdir().unwrap(),
-            port,
+            port: test_data::free_port(),
         };
         server.tell("start");
         server
