@@ -69,21 +69,65 @@ fn turned(bits: i64) -> i64 {
     bits ^ ((bits >> 63).cast_unsigned() >> 1).cast_signed()
 }
 
-/// The values of the given ranks (from 0, the lowest) among those of some keys, which are brought into another order: nothing is
-/// sorted but what lies between.
+/// Keys of which so many and more are sampled first.
+const SAMPLED_FROM: usize = 4096;
+/// Keys that are sampled.
+const SAMPLE: usize = 256;
+/// Ranks in the sample on both sides of where a rank is expected: three times what chance moves it by.
+const REACH: usize = 24;
+
+/// The values of the given ranks (from 0, the lowest) among those of some keys, which are used up: nothing is sorted but what lies
+/// between.
+///
+/// Of many, ranks side by side are sought in a few of the keys first, and then among those alone that lie about what was found there
+/// (Floyd and Rivest 1975, doi:10.1145/360680.360691).
 pub fn of_keys(keys: &mut [i64], ranks: &[usize]) -> Vec<f64> {
     let mut wanted = ranks.to_vec();
     wanted.sort_unstable();
+    let (below, count) = about_sample(keys, &wanted).unwrap_or((0, keys.len()));
+    let keys = &mut keys[..count];
     // What is before the next rank asked for is in its place.
     let mut done = 0;
-    for rank in wanted {
+    for rank in wanted.iter().map(|rank| rank - below) {
         if rank >= done {
             keys[done..].select_nth_unstable(rank - done);
             done = rank + 1;
         }
     }
-    let value = |rank: &usize| f64::from_bits(turned(keys[*rank]).cast_unsigned());
+    let value = |rank: &usize| f64::from_bits(turned(keys[rank - below]).cast_unsigned());
     ranks.iter().map(value).collect()
+}
+
+/// Brings keys that some ranks, rising, are among to the front: how many there are below them, and how many these are. None, and
+/// nothing is changed, of few keys, of ranks that lie far from one another, and where the sample says something else than the keys.
+fn about_sample(keys: &mut [i64], wanted: &[usize]) -> Option<(usize, usize)> {
+    let (first, last) = (*wanted.first()?, *wanted.last()?);
+    if keys.len() < SAMPLED_FROM || last - first > keys.len() / SAMPLE {
+        return None;
+    }
+    let mut sample: Vec<i64> = (0..SAMPLE).map(|i| keys[i * keys.len() / SAMPLE]).collect();
+    sample.sort_unstable();
+    let expected = |rank: usize| rank * SAMPLE / keys.len();
+    let low = expected(first).checked_sub(REACH).map(|at| sample[at]);
+    let high = sample.get(expected(last) + REACH).copied();
+    let (low, high) = (low.unwrap_or(i64::MIN), high.unwrap_or(i64::MAX));
+    let is_near = |key: i64| usize::from(low <= key) & usize::from(key <= high);
+    let below: usize = keys.iter().map(|key| usize::from(*key < low)).sum();
+    let count: usize = keys.iter().map(|key| is_near(*key)).sum();
+    if first < below || last - below >= count {
+        return None;
+    }
+    // Without a branch that nobody can foretell.
+    let mut at = 0;
+    for number in 0..keys.len() {
+        let key = keys[number];
+        keys[at] = key;
+        at += is_near(key);
+        if at == count {
+            break;
+        }
+    }
+    Some((below, count))
 }
 
 /// Bits whose order as whole numbers is that of the values.
@@ -126,6 +170,45 @@ mod tests {
             let bits: Vec<u64> = ranks.iter().map(|rank| all[*rank].to_bits()).collect();
             let found: Vec<u64> = sorted.iter().map(|value| value.to_bits()).collect();
             prop_assert_eq!(found, bits);
+        }
+
+        /// Rising ones, which a sample stands for, and others, which it does not.
+        #[test]
+        fn many_keys_are_selected_as_sorting_would(
+            count in SAMPLED_FROM - 2..3 * SAMPLED_FROM,
+            kinds in 1..5u64,
+            seed in any::<u64>(),
+        ) {
+            let noise = |i: usize| (i as u64 ^ seed).wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 20;
+            let key = |i: usize| match noise(i) % kinds {
+                0 => i as i64,
+                1 => (noise(i) % 7) as i64,
+                2 => -(noise(i) as i64),
+                _ => i64::MIN + i as i64,
+            };
+            let keys: Vec<i64> = (0..count).map(key).collect();
+            let mut sorted = keys.clone();
+            sorted.sort_unstable();
+            let at = seed as usize % count;
+            for ranks in [vec![at], vec![count / 2, (count - 1) / 2], vec![0, 0], vec![count - 1], vec![at, 0, count - 1]] {
+                let found = of_keys(&mut keys.clone(), &ranks);
+                let own: Vec<u64> = found.iter().map(|value| value.to_bits()).collect();
+                let right = ranks.iter().map(|rank| turned(sorted[*rank]).cast_unsigned());
+                prop_assert_eq!(own, right.collect::<Vec<u64>>());
+            }
+        }
+
+        /// All that the sample took are the lowest keys: the ranks lie elsewhere.
+        #[test]
+        fn a_sample_that_misleads_is_not_followed(count in SAMPLED_FROM..3 * SAMPLED_FROM) {
+            let mut keys: Vec<i64> = (0..count as i64).collect();
+            for i in 0..SAMPLE {
+                keys[i * count / SAMPLE] = -(i as i64) - 1;
+            }
+            let mut sorted = keys.clone();
+            sorted.sort_unstable();
+            let found = of_keys(&mut keys, &[count / 2]);
+            prop_assert_eq!(found[0].to_bits(), turned(sorted[count / 2]).cast_unsigned());
         }
     }
 }
