@@ -276,11 +276,11 @@ impl Objects {
         let Some(Storing { store, .. }) = &self.storing else {
             return Ok(None);
         };
-        if let Some(held) = self.open_versions.held(id) {
+        if let Some(held) = self.open_versions.held(id).await? {
             return Ok(Some(held));
         }
         let manifest = manifests::load(store, id).await?;
-        let opened = self.open_versions.values(store, &manifest, id).await?;
+        let opened = self.open_versions.opened(store, &manifest, id).await?;
         Ok(Some(opened))
     }
 

@@ -1,4 +1,4 @@
-//! Values of versions along time, opened once and held: what a version holds never changes.
+//! Values of versions along time, opened once and held: what a version holds never changes, though where it is read fastest may.
 
 use std::sync::Arc;
 
@@ -18,9 +18,17 @@ impl OpenVersions {
         Self(Cache::new(VERSIONS))
     }
 
-    /// Values of a version, if they are held.
-    pub(crate) fn held(&self, id: &ManifestId) -> Option<Values> {
-        self.0.get(id)
+    /// Values of a version, if they are held and opening them again would find nothing that is read faster.
+    ///
+    /// # Errors
+    /// A store that does not answer.
+    pub(crate) async fn held(&self, id: &ManifestId) -> Result<Option<Values>, CubeError> {
+        let Some(values) = self.0.get(id) else {
+            return Ok(None);
+        };
+        // A cube that grows or is being compacted is asked.
+        let is_best = values.is_settled() || values.is_current().await?;
+        Ok(is_best.then_some(values))
     }
 
     /// Values of a version, opened now if they are not held.
@@ -30,9 +38,19 @@ impl OpenVersions {
         manifest: &Manifest,
         id: &ManifestId,
     ) -> Result<Values, CubeError> {
-        if let Some(values) = self.held(id) {
-            return Ok(values);
+        match self.held(id).await? {
+            Some(values) => Ok(values),
+            None => self.opened(store, manifest, id).await,
         }
+    }
+
+    /// Values of a version, opened now.
+    pub(crate) async fn opened(
+        &self,
+        store: &Store,
+        manifest: &Manifest,
+        id: &ManifestId,
+    ) -> Result<Values, CubeError> {
         let values = Values::of(store, &Arc::new(manifest.clone())).await?;
         match values.in_fields_count() {
             0 => {}
@@ -40,8 +58,8 @@ impl OpenVersions {
                 tracing::debug!(version = %id, steps, "its cube lacks steps, which are read whole");
             }
         }
-        // What comes to be faster is opened again until it is.
-        if values.is_settled() {
+        // One without a cube may have one at any time.
+        if values.is_settled() || values.has_cube() {
             self.0.insert(id.clone(), values.clone());
         }
         Ok(values)

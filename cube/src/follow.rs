@@ -248,7 +248,7 @@ impl Follower<'_> {
         let message = version.to_string();
         let description = Description::named(manifest, version);
         let repository = Repository::for_change(self.store, self.folder, &description).await?;
-        if repository.has_tag(&tag).await {
+        if repository.has_version(&tag).await? {
             return Ok(followed);
         }
         let mut edit = Edit::describing(&repository, description.clone()).await?;
@@ -306,7 +306,7 @@ impl Follower<'_> {
         }
         let tag = there.number.to_string();
         // What was committed since is the same version: its time-major copy.
-        if !repository.has_tag(&tag).await {
+        if !repository.has_version(&tag).await? {
             repository.tag(&tag, &state.snapshot).await?;
         }
         Ok((there.number >= version.number).then(|| there.clone()))

@@ -403,6 +403,11 @@ impl Cube {
         self.0.values.array.storage().session()
     }
 
+    /// Names its state.
+    pub(crate) async fn snapshot(&self) -> String {
+        self.session().read().await.snapshot_id().to_string()
+    }
+
     /// Name of the values' array.
     pub(crate) fn array_name(&self) -> String {
         self.0.values.name()

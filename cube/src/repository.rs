@@ -229,6 +229,13 @@ impl Repository {
         })
     }
 
+    /// Names the newest state.
+    pub(crate) async fn newest_snapshot(&self) -> Result<String, CubeError> {
+        let newest = self.inner.lookup_branch(BRANCH).await;
+        let newest = newest.map_err(|e| self.failed("looking for the newest state", &e))?;
+        Ok(newest.to_string())
+    }
+
     /// Has a state this name?
     pub(crate) async fn is_tagged(&self, version: &str, snapshot: &str) -> bool {
         let there = self.inner.lookup_tag(version).await;
@@ -236,8 +243,15 @@ impl Repository {
     }
 
     /// Is there a state of this name?
-    pub(crate) async fn has_tag(&self, version: &str) -> bool {
-        self.inner.lookup_tag(version).await.is_ok()
+    ///
+    /// # Errors
+    /// A store that does not answer.
+    pub(crate) async fn has_version(&self, version: &str) -> Result<bool, CubeError> {
+        match self.inner.lookup_tag(version).await {
+            Ok(_snapshot) => Ok(true),
+            Err(error) if is_no_tag(&error) => Ok(false),
+            Err(error) => Err(self.failed("looking for a version", &error)),
+        }
     }
 
     /// Names of versions, sorted.

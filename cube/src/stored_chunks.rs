@@ -4,6 +4,7 @@
 //! less than a request each. Of other stores they are in memory.
 
 use std::cell::Cell;
+use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::ErrorKind;
 use std::ops::Range;
@@ -45,6 +46,17 @@ impl Source {
         match self {
             Self::Held(content) => content.len(),
             Self::File(_path, range) => (range.end - range.start) as usize,
+        }
+    }
+
+    /// Some of its bytes.
+    fn part(&self, bytes: &Range<usize>) -> Self {
+        match self {
+            Self::Held(content) => Self::Held(content.slice(bytes.clone())),
+            Self::File(path, range) => {
+                let at = |byte: usize| range.start + byte as u64;
+                Self::File(path.clone(), at(bytes.start)..at(bytes.end))
+            }
         }
     }
 }
@@ -109,6 +121,30 @@ impl StoredChunks {
     pub(crate) fn stored_bytes(&self) -> usize {
         let chunks = self.0.iter().flat_map(|part| &part.chunks);
         chunks.map(|chunk| chunk.bytes.len()).sum()
+    }
+
+    /// The same in `count` parts: those of the first `each` numbers, and so on; numbers begin anew in each.
+    pub(crate) fn split(self, each: usize, count: usize) -> Vec<Self> {
+        let mut split: Vec<Self> = (0..count).map(|_| Self::default()).collect();
+        for Part { source, chunks } in self.0 {
+            let mut by_part: BTreeMap<usize, Vec<InPart>> = BTreeMap::new();
+            for InPart { number, bytes } in chunks {
+                let own = by_part.entry(number / each).or_default();
+                let number = number % each;
+                own.push(InPart { number, bytes });
+            }
+            for (part, mut chunks) in by_part {
+                let starts = chunks.iter().map(|chunk| chunk.bytes.start);
+                let ends = chunks.iter().map(|chunk| chunk.bytes.end);
+                let range = starts.min().unwrap_or(0)..ends.max().unwrap_or(0);
+                for InPart { bytes, .. } in &mut chunks {
+                    *bytes = bytes.start - range.start..bytes.end - range.start;
+                }
+                let source = source.part(&range);
+                split[part].0.push(Part { source, chunks });
+            }
+        }
+        split
     }
 
     /// Hands over each chunk with its number, as they lie in their shards. `take` says whether to go on.
@@ -247,6 +283,17 @@ mod tests {
             assert_eq!(text(gone_through(chunks, false).unwrap()), "4cd 1f 0jk 7a");
             assert_eq!(text(gone_through(chunks, true).unwrap()), "0jk 1f 4cd 7a");
             assert_eq!(chunks.stored_bytes(), 6);
+        }
+        for chunks in [
+            held,
+            parts(&|path, range| Source::File(path.clone(), range)),
+        ] {
+            let split = chunks.split(3, 3);
+            let text: Vec<String> = split
+                .iter()
+                .map(|own| text(gone_through(own, true).unwrap()))
+                .collect();
+            assert_eq!(text, ["0jk 1f", "1cd", "1a"]);
         }
         let mut count = 0;
         let stopped = files.each(|_number, _bytes| {

@@ -54,6 +54,17 @@ struct Inner {
     cubes: Vec<Cube>,
     /// Of each step of the version.
     places: Vec<Place>,
+    /// Where the cube is and how it was when its steps were looked for; none where there was none.
+    seen: Option<Seen>,
+}
+
+/// A cube as it was seen.
+struct Seen {
+    repository: Repository,
+    /// Its newest state.
+    snapshot: String,
+    /// Had the version a state of its own?
+    has_own: bool,
 }
 
 /// Values of a block of cells in some steps.
@@ -122,6 +133,21 @@ impl EncodedBlocks {
     /// Where the steps that were asked for lie in the run.
     pub fn pieces(&self) -> &[Piece] {
         &self.pieces
+    }
+
+    /// The same in parts of so many blocks each, in their order; a block's place is that among those of its part.
+    pub fn split(self, each: usize) -> Vec<Self> {
+        let each = each.max(1);
+        let count = self.at.len().div_ceil(each);
+        let parts = self.at.chunks(each).zip(self.content.split(each, count));
+        let part = |(at, content): (&[[u32; 2]], StoredChunks)| Self {
+            cube: self.cube.clone(),
+            run: self.run,
+            at: at.to_vec(),
+            content,
+            pieces: self.pieces.clone(),
+        };
+        parts.map(part).collect()
     }
 
     /// Bytes of all of them as they are stored.
@@ -194,22 +220,61 @@ impl Values {
                 places: vec![Place::Field; manifest.steps.len()],
                 manifest: Arc::clone(manifest),
                 cubes: vec![],
+                seen: None,
             };
             let repository = match Repository::open(store, &folder(&manifest.product)).await {
                 Ok(repository) => repository,
                 Err(CubeError::Missing { .. }) => return Ok(Self(Arc::new(own))),
                 Err(error) => return Err(error),
             };
-            own.take(repository.at(&At::Newest).await?);
+            let newest = repository.at(&At::Newest).await?;
+            let snapshot = newest.snapshot().await;
+            own.take(newest);
+            let mut has_own = false;
             if own.places.contains(&Place::Field) {
                 let version = At::Version(manifest.number.to_string());
                 match repository.at(&version).await {
-                    Ok(cube) => own.take(cube),
+                    Ok(cube) => {
+                        has_own = true;
+                        own.take(cube);
+                    }
                     Err(CubeError::NoVersion { .. }) => {}
                     Err(error) => return Err(error),
                 }
             }
+            own.seen = Some(Seen {
+                repository,
+                snapshot,
+                has_own,
+            });
             Ok(Self(Arc::new(own)))
+        })
+    }
+
+    /// Had its product a cube, which can be asked whether it is the same still?
+    pub fn has_cube(&self) -> bool {
+        self.0.seen.is_some()
+    }
+
+    /// Would opening the version again find the same? By one read of what the cube's repository tells of all its states, or two where
+    /// the cube lacks steps of it; a version whose product had no cube is to be opened again.
+    ///
+    /// # Errors
+    /// A store that does not answer.
+    pub fn is_current(&self) -> BoxFuture<'_, Result<bool, CubeError>> {
+        Box::pin(async move {
+            let Some(seen) = &self.0.seen else {
+                return Ok(false);
+            };
+            if seen.repository.newest_snapshot().await? != seen.snapshot {
+                return Ok(false);
+            }
+            if seen.has_own || !self.0.places.contains(&Place::Field) {
+                return Ok(true);
+            }
+            // A state may be given the version's name without any change of the newest one.
+            let version = self.0.manifest.number.to_string();
+            Ok(!seen.repository.has_version(&version).await?)
         })
     }
 
@@ -325,6 +390,7 @@ impl Values {
             manifest,
             places,
             cubes,
+            ..
         } = &*self.0;
         match places.get(step) {
             None => Err(self.outside(&format!("step {step}"))),
@@ -374,6 +440,7 @@ impl Values {
             manifest,
             places,
             cubes,
+            ..
         } = &*self.0;
         let Some(place) = places.get(step) else {
             return Err(self.outside(&format!("step {step}")));

@@ -222,6 +222,43 @@ async fn a_few_cells_of_fields_alone_are_read_of_their_chunks_and_all_cells_of_w
 }
 
 #[tokio::test]
+async fn a_version_that_is_held_is_the_newest_until_there_is_something_to_read_faster() {
+    let store = Store::memory();
+    let steps = months(RUN + 1);
+    let old = Arc::new(version(&store, grid(9, 11), 1, &steps).await);
+    let without = Values::of(&store, &old).await.unwrap();
+    assert!(!without.is_current().await.unwrap(), "no cube yet");
+
+    let mut revised = steps.clone();
+    revised[3].1 += 100;
+    let new = version(&store, grid(9, 11), 2, &revised).await;
+    follow(&store, &new).await.unwrap();
+    let (counted, traffic) = store.counted();
+    let found = Values::of(&counted, &old).await.unwrap();
+    assert_eq!(found.in_fields_count(), 1);
+    let before = traffic.counts();
+    assert!(found.is_current().await.unwrap());
+    let asked = traffic.counts().since(before);
+    assert!(asked.reads <= 2, "{} reads", asked.reads);
+    follow(&store, &old).await.unwrap();
+    assert!(
+        !found.is_current().await.unwrap(),
+        "it has a state of its own"
+    );
+
+    let found = Values::of(&store, &old).await.unwrap();
+    assert_eq!(found.in_fields_count(), 0);
+    assert!(found.is_current().await.unwrap() && !found.is_settled());
+    compact(&store, FOLDER).await.unwrap();
+    assert!(
+        !found.is_current().await.unwrap(),
+        "runs of steps are there"
+    );
+    let found = answers(&store, &old, &steps).await;
+    assert!(found.is_current().await.unwrap());
+}
+
+#[tokio::test]
 async fn another_grid_begins_without_runs() {
     let store = Store::memory();
     let steps = months(RUN);
