@@ -3,6 +3,8 @@
 mod anomalies;
 mod blocks;
 mod cells;
+mod encoded;
+mod held;
 mod kept;
 mod landed;
 mod means;
@@ -14,6 +16,8 @@ mod ranges;
 mod runs;
 mod sources;
 mod wanted;
+
+use std::sync::Arc;
 
 use contract::ContractError;
 use contract::analysis::{MapOptions, MapStatistic};
@@ -68,7 +72,7 @@ pub fn derive_statistics<'a>(
 ) -> BoxFuture<'a, Result<Vec<Manifest>, ComputeError>> {
     Box::pin(async move {
         let sources = Sources::read(engine, product, options).await?;
-        let wanted = Wanted::of(&sources.first, one_region(options)?)?;
+        let wanted = Arc::new(Wanted::of(&sources.first, one_region(options)?)?);
         let mut asked = vec![];
         for one in options {
             asked.push(Asked::of(engine, sources.of(one)?, one).await?);
@@ -113,7 +117,7 @@ pub fn derive_statistics<'a>(
             };
             let (derived, at_hand) = match plan.statistic {
                 MapStatistic::Anomaly => landing.anomalies(computed, progress).await?,
-                _ => (landing.each(computed).await?, None),
+                _ => (landing.each(computed.maps).await?, None),
             };
             made.push(commit_with(engine, derived, at_hand).await?);
         }

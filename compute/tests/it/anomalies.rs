@@ -303,23 +303,37 @@ async fn means_that_nothing_is_an_anomaly_of_are_refused_with_the_reason() {
     );
 }
 
-/// Every step of every day, as the cube has them and as the fields do.
+/// Every step of every day, as the cube has them and as the fields do: held since the normals were made, and, where there is no room
+/// for those of days, made of the product again.
 #[tokio::test(flavor = "multi_thread")]
 async fn a_cube_of_anomalies_is_that_of_its_fields_and_time_major_at_once() {
     let (_folder, store) = folder_store();
     let days = landed(&store).await;
     let engine = Engine::in_process(store.clone(), parts(2));
-    let options = [
-        MapOptions {
-            name: Some(product("days")),
-            ..MapOptions::new(MapStatistic::Anomaly)
-        },
-        of(TimeStep::Week, "weeks"),
-    ];
-    let made = derive_statistics(&engine, &product("wind"), &options, &|_| ())
-        .await
-        .unwrap();
+    let options = |which: &str| {
+        [
+            MapOptions {
+                name: Some(product(&format!("days-{which}"))),
+                ..MapOptions::new(MapStatistic::Anomaly)
+            },
+            of(TimeStep::Week, &format!("weeks-{which}")),
+        ]
+    };
+    let small = engine.clone().with_memory_bytes(2 << 20);
+    let mut made = vec![];
+    for (engine, which) in [(&engine, "held"), (&small, "made")] {
+        let options = options(which);
+        let own = derive_statistics(engine, &product("wind"), &options, &|_| ()).await;
+        made.extend(own.unwrap());
+    }
     assert_eq!(made[0].steps.len(), days.len());
+    for (held, again) in made[..2].iter().zip(&made[2..]) {
+        let values = |manifest: &Manifest| -> Vec<_> {
+            let fields = manifest.steps.iter().map(|step| step.field.vouches());
+            fields.collect()
+        };
+        assert_eq!(values(held), values(again));
+    }
     let whole = Window {
         row: 0,
         col: 0,
@@ -350,4 +364,37 @@ async fn a_cube_of_anomalies_is_that_of_its_fields_and_time_major_at_once() {
             }
         }
     }
+}
+
+/// Read by their own bytes, and of fields where there is no cube.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_damaged_cube_is_named_and_without_one_anomalies_are_the_same() {
+    let (_folder, store) = folder_store();
+    landed(&store).await;
+    cube::compacted().await;
+    let engine = || Engine::in_process(store.clone(), parts(2)).with_memory_bytes(2 << 20);
+    let made = derived(&engine(), &of(TimeStep::Week, "weeks"))
+        .await
+        .unwrap();
+    let folder = "cubes/wind";
+    let chunks = store.list(&format!("{folder}/chunks")).await.unwrap();
+    for key in &chunks {
+        let mut content = store.get(key).await.unwrap().to_vec();
+        let middle = content.len() / 2;
+        content[middle] ^= 1;
+        store.put_over(key, content.into()).await.unwrap();
+    }
+    let damaged = derived(&engine(), &of(TimeStep::Week, "damaged")).await;
+    let error = damaged.unwrap_err().to_string();
+    assert!(error.contains(folder), "{error}");
+    for key in store.list(folder).await.unwrap() {
+        store.remove(&key).await.unwrap();
+    }
+    let without = derived(&engine(), &of(TimeStep::Week, "without"))
+        .await
+        .unwrap();
+    for (own, other) in made.steps.iter().zip(&without.steps) {
+        assert_eq!(own.field.vouches(), other.field.vouches());
+    }
+    assert_eq!(made.steps.len(), without.steps.len());
 }

@@ -12,10 +12,10 @@ use storage::{StorageError, fields};
 
 use super::super::{DeriveProgress, Progress};
 use super::blocks::Blocks;
-use super::landed::{Found, Landing};
+use super::landed::{Computed, Found, Landing};
 use super::means::{MeanOf, Sum};
 use super::plan::Output;
-use super::runs::{Less, MadeRun, OfAnomalies, Runs};
+use super::runs::{AnomaliesOf, Less, MadeRun, OfAnomalies, Runs};
 use crate::ComputeError;
 
 /// Most fields on their way for each that can be encoded at once: others are flushed to the disk meanwhile.
@@ -29,36 +29,37 @@ const CELL_BYTES: usize = 28;
 pub(super) type Made = (Manifest, Option<Arc<dyn AtHand>>);
 
 impl Landing<'_> {
-    /// Stores everything but the manifest, which is returned with number 0; `normals` are those of every bin, `[bin][row, col]`,
-    /// stored unit, NaN where there is none.
+    /// Stores everything but the manifest, which is returned with number 0, of anomalies that are held or of their normals.
     pub(super) async fn anomalies(
         &self,
-        normals: Vec<Vec<f64>>,
+        computed: Computed,
         progress: &Progress<'_>,
     ) -> Result<Made, ComputeError> {
         let (plan, source, engine) = (self.plan, self.sources.first, self.engine);
-        let bin = |output: &Output| plan.parts.of_period(output.period);
-        let less = Arc::new(Less {
-            grid: source.grid,
-            of: Arc::clone(&plan.anomalies_of),
-            bins: plan.outputs.iter().map(bin).collect(),
-            normals,
-            factor: plan.factor,
-        });
-        let blocks = Blocks::of(
-            &source.grid,
-            self.wanted,
-            source.steps.len(),
-            engine.memory_bytes(),
-        );
-        let Some(blocks) = blocks.held_in_runs(&source.grid) else {
-            return Ok((self.by_fields(&less, progress).await?, None));
+        let blocks = Arc::new(Blocks::of(engine, &source.grid, self.wanted));
+        let of = match computed.held {
+            Some(held) => AnomaliesOf::Held(Arc::new(held)),
+            None => {
+                let bin = |output: &Output| plan.parts.of_period(output.period);
+                let less = Arc::new(Less {
+                    grid: source.grid,
+                    of: Arc::clone(&plan.anomalies_of),
+                    bins: plan.outputs.iter().map(bin).collect(),
+                    normals: computed.maps,
+                    factor: plan.factor,
+                });
+                if !blocks.are_held_in_runs() {
+                    return Ok((self.by_fields(&less, progress).await?, None));
+                }
+                let source = engine.values(source, &source.id()).await?;
+                AnomaliesOf::Product { source, less }
+            }
         };
         let mut at_hand = OfAnomalies {
             runs: Runs {
-                source: engine.values(source, &source.id()).await?,
                 blocks,
-                less,
+                count: plan.outputs.len(),
+                of,
             },
             checks: vec![],
         };

@@ -1,4 +1,5 @@
-//! Blocks of cells over all time, as many at once as fit a bound; of a region those that it touches.
+//! Blocks of cells over all time: as many read together as fit a bound, in pieces that a processor works on; of a region those that it
+//! touches.
 
 use std::ops::Range;
 
@@ -7,23 +8,22 @@ use contract::grid::Grid;
 use contract::manifest::Manifest;
 use cube::{BLOCK_CELLS, RUN_STEPS, Values};
 
+use super::encoded;
 use super::wanted::Wanted;
-use crate::ComputeError;
+use crate::Engine;
 
-/// Share of the memory for work that the values of some blocks take.
-const HELD_SHARE: usize = 8;
-
+/// Share of the memory for work that the values of a group of blocks may take: while one is read the next one is, too, and of one the
+/// pieces are laid along time that are worked on.
+const GROUP_SHARE: usize = 24;
 /// Share of the memory for work that the values of all blocks in a run of steps may take, if runs are to be held: one is read while
 /// one is made, and one waits.
 const RUN_SHARE: usize = 8;
+/// Bytes of values that one processor works on at a time: more are slower to be mapped, cleared and gone through again.
+const PIECE_BYTES: usize = 8 << 20;
+const BLOCK_BYTES: usize = (BLOCK_CELLS * BLOCK_CELLS) as usize * size_of::<f32>();
 
-/// Cells over all steps.
-pub(super) struct Cells {
-    /// Place of each in the grid, row-major.
-    pub(super) places: Vec<usize>,
-    /// `[cell, step]`, stored unit, NaN no data.
-    pub(super) values: Vec<f32>,
-}
+/// Groups of blocks that are on their way at once: one is read while one is computed with.
+pub(super) const GROUPS_AT_ONCE: usize = 2;
 
 /// A version whose cells are read.
 pub(super) struct Reading<'a> {
@@ -33,84 +33,114 @@ pub(super) struct Reading<'a> {
     pub(super) steps: Range<usize>,
 }
 
-/// The blocks of a grid, and how many are read at once.
+/// The blocks of a grid in which some cell is wanted.
 pub(super) struct Blocks {
-    /// By their numbers, increasing.
-    windows: Vec<(u32, Window)>,
-    at_once: usize,
-    /// Have all of them room at a run of steps?
-    is_run_held: bool,
+    /// Row by row from the north-west corner on.
+    windows: Vec<Window>,
+    memory_bytes: usize,
+}
+
+/// How blocks are read and worked on.
+pub(super) struct Groups<'a> {
+    windows: &'a [Window],
+    /// Blocks that are read together: the more, the fewer requests.
+    each: usize,
+    pub(super) pieces: Pieces,
+}
+
+/// How those of a group are worked on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Pieces {
+    /// Blocks of each piece, of the last one perhaps less.
+    pub(super) each: usize,
+    /// Pieces that are worked on at once; all that there are where memory is for one a processor.
+    pub(super) at_once: usize,
+}
+
+impl Pieces {
+    /// Those of blocks of so many bytes that fit into so much memory on so many processors.
+    fn of(block_bytes: usize, memory_bytes: usize, processors: usize) -> Self {
+        let each = PIECE_BYTES.min(memory_bytes / processors) / block_bytes;
+        let each = each.max(1);
+        let at_once = memory_bytes / (each * block_bytes);
+        Self {
+            each,
+            at_once: if at_once < processors {
+                at_once.max(1)
+            } else {
+                usize::MAX
+            },
+        }
+    }
+}
+
+impl<'a> Groups<'a> {
+    /// Their blocks, by their cells.
+    pub(super) fn of_blocks(&self) -> impl Iterator<Item = &'a [Window]> {
+        self.windows.chunks(self.each)
+    }
 }
 
 impl Blocks {
-    /// Those in which some cell is wanted; work may take so much memory, and each cell has so many steps, of all versions that are
-    /// read together.
-    pub(super) fn of(grid: &Grid, wanted: &Wanted, step_count: usize, memory_bytes: usize) -> Self {
-        let block_bytes = (BLOCK_CELLS * BLOCK_CELLS) as usize * size_of::<f32>();
-        let windows: Vec<(u32, Window)> = (0..)
-            .zip(windows(grid, BLOCK_CELLS, BLOCK_CELLS))
-            .filter(|(_, window)| wanted.is_any_of(grid, *window))
-            .collect();
-        let run_bytes = windows.len().saturating_mul(block_bytes * RUN_STEPS);
-        let all_bytes = block_bytes * step_count.max(1);
+    /// Those of a grid.
+    pub(super) fn of(engine: &Engine, grid: &Grid, wanted: &Wanted) -> Self {
+        let mut windows = windows(grid, BLOCK_CELLS, BLOCK_CELLS);
+        windows.retain(|window| wanted.is_any_of(grid, *window));
         Self {
-            is_run_held: run_bytes <= memory_bytes / RUN_SHARE,
             windows,
-            at_once: (memory_bytes / HELD_SHARE / all_bytes).max(1),
+            memory_bytes: engine.memory_bytes(),
         }
     }
 
-    /// Runs of blocks that are read together, in their order.
-    pub(super) fn runs(&self) -> impl Iterator<Item = Range<usize>> + use<> {
-        let (all, at_once) = (self.windows.len(), self.at_once);
-        (0..all.div_ceil(at_once)).map(move |run| run * at_once..((run + 1) * at_once).min(all))
-    }
-
-    /// The cells of a run of blocks at all steps; NaN at those that are not needed.
-    pub(super) async fn read(
-        &self,
-        reading: &Reading<'_>,
-        run: Range<usize>,
-    ) -> Result<Cells, ComputeError> {
-        let Reading {
-            manifest,
-            values,
-            steps: needed,
-        } = reading;
-        let blocks = &self.windows[run];
-        let places = blocks
-            .iter()
-            .flat_map(|(_, block)| block.cell_indices(&manifest.grid));
-        let places: Vec<usize> = places.collect();
-        let asked = at(blocks, &manifest.grid);
-        let step_count = manifest.steps.len();
-        let mut cells = Cells {
-            values: vec![f32::NAN; places.len() * step_count],
-            places,
-        };
-        let is_needed = |steps: &Range<usize>| steps.start < needed.end && needed.start < steps.end;
-        for steps in values.runs().into_iter().filter(is_needed) {
-            let found = values.blocks(&asked, steps.clone()).await?;
-            let mut first = 0;
-            for block in &found {
-                for own in block.values.chunks_exact(steps.len().max(1)) {
-                    cells.values[first * step_count..][steps.clone()].copy_from_slice(own);
-                    first += 1;
-                }
-            }
+    /// Groups of them, of so many steps of all versions that are read together.
+    pub(super) fn groups(&self, steps: usize) -> Groups<'_> {
+        let block_bytes = BLOCK_BYTES * steps.max(1);
+        let room = self.memory_bytes / GROUP_SHARE;
+        Groups {
+            windows: &self.windows,
+            each: (room / block_bytes).max(1),
+            pieces: Pieces::of(block_bytes, room, rayon::current_num_threads()),
         }
-        Ok(cells)
     }
 
-    /// Rows and columns of all of them; none where a run of steps of all takes too much memory.
-    pub(super) fn held_in_runs(&self, grid: &Grid) -> Option<Vec<[u32; 2]>> {
-        self.is_run_held.then(|| at(&self.windows, grid))
+    /// Has a run of steps of all of them room?
+    pub(super) fn are_held_in_runs(&self) -> bool {
+        let run_bytes = self.windows.len().saturating_mul(BLOCK_BYTES * RUN_STEPS);
+        run_bytes <= self.memory_bytes / RUN_SHARE
+    }
+
+    /// Rows and columns of all of them.
+    pub(super) fn at(&self) -> Vec<[u32; 2]> {
+        encoded::at(&self.windows)
+    }
+
+    /// Their cells.
+    pub(super) fn windows(&self) -> &[Window] {
+        &self.windows
+    }
+
+    /// How many cells they have together.
+    pub(super) fn cell_count(&self) -> usize {
+        self.windows.iter().map(|block| block.cell_count()).sum()
     }
 }
 
-/// Rows and columns of blocks.
-fn at(blocks: &[(u32, Window)], grid: &Grid) -> Vec<[u32; 2]> {
-    let across = grid.cols.div_ceil(BLOCK_CELLS);
-    let at = |(number, _): &(u32, Window)| [number / across, number % across];
-    blocks.iter().map(at).collect()
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pieces_are_for_all_processors_and_in_bounds() {
+        let piece = |block_bytes, memory_bytes, processors| {
+            let Pieces { each, at_once } = Pieces::of(block_bytes, memory_bytes, processors);
+            (each, at_once)
+        };
+        // Much memory: as large as a processor likes.
+        assert_eq!(piece(1 << 20, 1 << 30, 4), (8, usize::MAX));
+        // Less: as many pieces as there are processors have room.
+        assert_eq!(piece(1 << 20, 8 << 20, 4), (2, usize::MAX));
+        // Little: fewer are worked on at once.
+        assert_eq!(piece(1 << 20, 3 << 20, 16), (1, 3));
+        assert_eq!(piece(1 << 20, 1 << 10, 16), (1, 1));
+    }
 }

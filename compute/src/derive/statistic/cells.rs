@@ -12,6 +12,7 @@ use contract::analysis::{
 use contract::statistics::Percentile;
 use contract::time::{Period, TimeStep};
 
+use super::held::Anomalies;
 use super::means::MeanOf;
 use super::pairs::Pairs;
 use super::plan::Plan;
@@ -25,13 +26,15 @@ const DAY_MS: f64 = 86_400_000.0;
 /// Statistics of a cell, each over its own steps, what they need made once.
 pub(super) struct OfCells {
     each: Vec<OfCell>,
+    /// Of each statistic the anomalies that are made with it.
+    anomalies: Vec<Option<Anomalies>>,
     /// What correlations are made by.
     pairs: Vec<Pairs>,
 }
 
 impl OfCells {
-    /// Those of some plans over the steps of these periods.
-    pub(super) fn new(plans: &[Plan], periods: &[Period]) -> Self {
+    /// Those of some plans over the steps of these periods, with the anomalies of those of which they are held.
+    pub(super) fn new(plans: &[Plan], are_held: &[bool], periods: &[Period]) -> Self {
         let mut each: Vec<OfCell> = vec![];
         let mut pairs: Vec<Pairs> = vec![];
         for plan in plans {
@@ -51,7 +54,19 @@ impl OfCells {
             }
             each.push(own);
         }
-        Self { each, pairs }
+        let anomalies = plans.iter().zip(are_held);
+        let anomalies = anomalies.map(|(plan, is_held)| is_held.then(|| Anomalies::new(plan)));
+        Self {
+            anomalies: anomalies.collect(),
+            each,
+            pairs,
+        }
+    }
+
+    /// Anomalies that a cell has of each statistic.
+    pub(super) fn anomaly_counts(&self) -> impl Iterator<Item = usize> {
+        let anomalies = self.anomalies.iter();
+        anomalies.map(|own| own.as_ref().map_or(0, Anomalies::count))
     }
 
     /// Values that a cell has of each statistic: bins of those that have them, else one.
@@ -60,10 +75,16 @@ impl OfCells {
     }
 
     /// The statistics of a cell, one after the other, NaN where too little holds data; `values` of each product are one for each
-    /// step of its version, stored unit, NaN no data; of the second product none where no statistic is of two.
-    pub(super) fn write(&self, values: [&[f32]; 2], mut out: &mut [f64]) {
+    /// step of its version, stored unit, NaN no data; of the second product none where no statistic is of two. Anomalies come apart from
+    /// their normals.
+    pub(super) fn write(
+        &self,
+        values: [&[f32]; 2],
+        mut out: &mut [f64],
+        mut anomalies: &mut [f32],
+    ) {
         let mut shared = Shared::default();
-        for own in &self.each {
+        for (own, of_own) in self.each.iter().zip(&self.anomalies) {
             let (first, rest) = out.split_at_mut(own.output_count());
             match own.pairs {
                 Some(at) => {
@@ -71,6 +92,11 @@ impl OfCells {
                     first[0] = own.of_pairs(row, self.pairs[at].most());
                 }
                 None => own.write(&values[0][own.over.read.clone()], first, &mut shared),
+            }
+            if let Some(of_own) = of_own {
+                let (of_cell, rest) = anomalies.split_at_mut(of_own.count());
+                of_own.write(values[0], first, of_cell);
+                anomalies = rest;
             }
             out = rest;
         }
@@ -80,6 +106,8 @@ impl OfCells {
 /// What several statistics of one cell are read from, by the steps that it is of.
 #[derive(Default)]
 struct Shared {
+    /// Share of the time that holds data.
+    time_share: Option<(Range<usize>, f64)>,
     /// Slope a decade, and its test.
     trend: Kept<(f64, MannKendall)>,
     least_squares: Kept<LeastSquaresTrend>,
@@ -193,7 +221,12 @@ impl OfCell {
             self.bin_means(values, out);
             return;
         }
-        let share = self.time_share(values);
+        let kept = shared.time_share.take();
+        let kept = kept.filter(|(of, _)| *of == self.over.read);
+        let (_, share) = shared
+            .time_share
+            .insert(kept.unwrap_or_else(|| (self.over.read.clone(), self.time_share(values))));
+        let share = *share;
         out[0] = match self.statistic {
             // These say how little there is.
             MapStatistic::Coverage if share > 0.0 => 100.0 * share,

@@ -5,16 +5,21 @@ use std::sync::Arc;
 
 use contract::ContractError;
 use contract::analysis::{CorrelationStatistic, MapStatistic};
+use contract::chunk::Window;
 use contract::manifest::{MANIFEST_SCHEMA, Manifest, Step};
 use contract::product::ProductId;
 use contract::time::Period;
+use futures::{FutureExt as _, StreamExt as _, TryStreamExt as _, stream};
 use rayon::prelude::*;
 use storage::{domain, fields};
 
 use super::super::{DeriveProgress, Progress};
-use super::blocks::{Blocks, Reading};
+use super::blocks::{Blocks, GROUPS_AT_ONCE, Pieces, Reading};
 use super::cells::OfCells;
+use super::encoded::Encoded;
+use super::held::{Held, are_held};
 use super::plan::{Output, Plan};
+use super::runs::off_thread;
 use super::sources::{Sources, SourcesOf};
 use super::wanted::Wanted;
 use crate::{ComputeError, Engine};
@@ -31,72 +36,169 @@ pub(super) struct Landing<'a> {
     pub(super) wanted: &'a Wanted,
 }
 
-/// Statistics of every cell that is wanted, by statistic `[output][row, col]`, stored unit, NaN where there is none.
+/// What was computed of one statistic.
+pub(super) struct Computed {
+    /// `[output][row, col]`, of anomalies their normals; stored unit, NaN where there is none.
+    pub(super) maps: Vec<Vec<f64>>,
+    /// Anomalies, if they are few.
+    pub(super) held: Option<Held>,
+}
+
+/// Statistics of every cell that is wanted, by statistic.
 pub(super) async fn computed(
     engine: &Engine,
     sources: &Sources,
     plans: &[Plan],
-    wanted: &Wanted,
+    wanted: &Arc<Wanted>,
     progress: &Progress<'_>,
-) -> Result<Vec<Vec<Vec<f64>>>, ComputeError> {
+) -> Result<Vec<Computed>, ComputeError> {
     if plans.is_empty() {
         return Ok(vec![]);
     }
     let source = &sources.first;
+    let cell_count = source.grid.cell_count();
+    let blocks = Blocks::of(engine, &source.grid, wanted);
+    let are_held = are_held(plans, &blocks, engine.memory_bytes());
     let periods: Vec<Period> = source.steps.iter().map(|step| step.period).collect();
-    let of_cells = Arc::new(OfCells::new(plans, &periods));
+    let of_cells = Arc::new(OfCells::new(plans, &are_held, &periods));
     let counts = of_cells.output_counts();
     let outputs: usize = counts.iter().sum();
-    let cell_count = source.grid.cell_count();
     check_room(engine, plans, [outputs, cell_count])?;
     let mut all = vec![vec![f64::NAN; cell_count]; outputs];
-    let readings = readings(engine, sources, plans).await?;
-    let steps_of: Vec<usize> = readings.iter().map(|it| it.manifest.steps.len()).collect();
-    let steps_of_all = steps_of.iter().sum();
-    let blocks = Blocks::of(&source.grid, wanted, steps_of_all, engine.memory_bytes());
+    let room = |count| (count > 0).then(|| Held::nothing(count, blocks.cell_count()));
+    let mut held: Vec<Option<Held>> = of_cells.anomaly_counts().map(room).collect();
+    let readings = readings(engine, sources, plans, &are_held).await?;
     let all_cells = wanted.count(0..cell_count);
     let mut done = 0;
-    for run in blocks.runs() {
-        let mut places = vec![];
-        let mut values = vec![];
-        for reading in &readings {
-            let cells = blocks.read(reading, run.clone()).await?;
-            places = cells.places;
-            values.push(cells.values);
-        }
-        let (of_cells, steps_of) = (Arc::clone(&of_cells), steps_of.clone());
-        let is_wanted: Vec<bool> = places.iter().map(|place| wanted.is(*place)).collect();
-        let computing = move || {
-            let mut found = vec![f64::NAN; places.len() * outputs];
-            let each = found.par_chunks_mut(outputs).zip(&is_wanted).enumerate();
-            each.filter(|(_, (_, is_wanted))| **is_wanted)
-                .for_each(|(at, (out, _))| {
-                    let of_side = |side: usize| match (values.get(side), steps_of.get(side)) {
-                        (Some(values), Some(steps)) => &values[at * steps..][..*steps],
-                        _ => &[],
-                    };
-                    of_cells.write([of_side(0), of_side(1)], out);
-                });
-            (places, found)
-        };
-        let computed = tokio::task::spawn_blocking(computing).await;
-        let (places, found) = computed.map_err(|e| ComputeError::inconsistent("a statistic", e))?;
-        for (place, found) in places.iter().zip(found.chunks_exact(outputs)) {
-            for (output, value) in all.iter_mut().zip(found) {
+    let steps_of_all = readings.iter().map(|it| it.manifest.steps.len()).sum();
+    let groups = blocks.groups(steps_of_all);
+    let mut found = stream::iter(groups.of_blocks())
+        .map(|windows| found(&of_cells, wanted, &readings, (windows, groups.pieces)).boxed())
+        .buffered(GROUPS_AT_ONCE)
+        .map_ok(|found| stream::iter(found.into_iter().map(Ok::<OfBlocks, ComputeError>)))
+        .try_flatten()
+        .boxed();
+    while let Some(found) = found.try_next().await? {
+        for (cell, place) in found.places.iter().enumerate() {
+            let values = &found.values[cell * outputs..][..outputs];
+            for (output, value) in all.iter_mut().zip(values) {
                 output[*place] = *value;
             }
         }
-        done += wanted.count(places.into_iter());
+        let mut anomalies = found.anomalies.as_slice();
+        while !anomalies.is_empty() {
+            for held in held.iter_mut().flatten() {
+                anomalies = held.take(anomalies);
+            }
+        }
+        done += wanted.count(found.places.into_iter());
         progress(DeriveProgress {
             done_steps: done,
             all_steps: all_cells,
         });
     }
+    drop(found);
     let mut all = all.into_iter();
-    let by_plan = counts
-        .into_iter()
-        .map(|count| all.by_ref().take(count).collect());
+    let by_plan = counts.into_iter().zip(held);
+    let by_plan = by_plan.map(|(count, held)| Computed {
+        maps: all.by_ref().take(count).collect(),
+        held,
+    });
     Ok(by_plan.collect())
+}
+
+/// Statistics of some blocks of cells.
+struct OfBlocks {
+    /// Place of each cell in the grid, row-major.
+    places: Vec<usize>,
+    /// `[cell, output]`.
+    values: Vec<f64>,
+    /// `[cell, anomaly]`, of all statistics of which anomalies are held.
+    anomalies: Vec<f32>,
+}
+
+/// Reads some blocks and computes the statistics of their cells that are wanted, on all processors; piece by piece.
+async fn found(
+    of_cells: &Arc<OfCells>,
+    wanted: &Arc<Wanted>,
+    readings: &[Reading<'_>],
+    (windows, pieces): (&[Window], Pieces),
+) -> Result<Vec<OfBlocks>, ComputeError> {
+    let mut sides = vec![];
+    for Reading { values, steps, .. } in readings {
+        sides.push(Encoded::find(values, windows.to_vec(), steps.clone()).await?);
+    }
+    let grid = readings[0].manifest.grid;
+    let steps_of: Vec<usize> = readings.iter().map(|it| it.manifest.steps.len()).collect();
+    let (of_cells, wanted) = (Arc::clone(of_cells), Arc::clone(wanted));
+    let computing = move || {
+        let sides: Vec<Vec<Encoded>> = sides
+            .into_iter()
+            .map(|own| own.split(pieces.each))
+            .collect();
+        let count = sides.first().map_or(0, Vec::len);
+        let of_piece = |piece: usize| {
+            let of_piece = sides.iter().zip(&steps_of).enumerate();
+            let values = of_piece.map(|(side, (own, steps))| {
+                let values = own[piece].values(&(0..*steps));
+                values.map_err(|damaged| (side, piece, damaged))
+            });
+            let values: Vec<Vec<f32>> = values.collect::<Result<_, _>>()?;
+            let places = sides[0][piece].windows().iter();
+            let places = places.flat_map(|block| block.cell_indices(&grid)).collect();
+            Ok(computed_of(
+                &of_cells,
+                &wanted,
+                places,
+                (&values, &steps_of),
+            ))
+        };
+        let mut found = vec![];
+        for first in (0..count).step_by(pieces.at_once.min(count).max(1)) {
+            let some = first..count.min(first.saturating_add(pieces.at_once));
+            let some: Result<Vec<OfBlocks>, _> = some.into_par_iter().map(of_piece).collect();
+            match some {
+                Ok(some) => found.extend(some),
+                Err((side, piece, damaged)) => return Err((sides, (side, piece), damaged)),
+            }
+        }
+        Ok(found)
+    };
+    match off_thread(computing).await? {
+        Ok(found) => Ok(found),
+        Err((sides, (side, piece), damaged)) => Err(sides[side][piece].error(damaged).await),
+    }
+}
+
+/// The statistics of the cells at some places that are wanted; `sides` are the values of each product, `[cell, step]`, and its steps.
+fn computed_of(
+    of_cells: &OfCells,
+    wanted: &Wanted,
+    places: Vec<usize>,
+    sides: (&[Vec<f32>], &[usize]),
+) -> OfBlocks {
+    let outputs: usize = of_cells.output_counts().iter().sum();
+    let held: usize = of_cells.anomaly_counts().sum();
+    let mut values = vec![f64::NAN; places.len() * outputs];
+    let mut anomalies = vec![f32::NAN; places.len() * held];
+    for (cell, _) in places
+        .iter()
+        .enumerate()
+        .filter(|(_, place)| wanted.is(**place))
+    {
+        let of_side = |side: usize| match (sides.0.get(side), sides.1.get(side)) {
+            (Some(values), Some(steps)) => &values[cell * steps..][..*steps],
+            _ => &[],
+        };
+        let values = &mut values[cell * outputs..][..outputs];
+        let anomalies = &mut anomalies[cell * held..][..held];
+        of_cells.write([of_side(0), of_side(1)], values, anomalies);
+    }
+    OfBlocks {
+        places,
+        values,
+        anomalies,
+    }
 }
 
 /// Is there room for the values of all outputs?
@@ -121,10 +223,14 @@ async fn readings<'a>(
     engine: &Engine,
     sources: &'a Sources,
     plans: &[Plan],
+    are_held: &[bool],
 ) -> Result<Vec<Reading<'a>>, ComputeError> {
     let mut readings = vec![];
     for (side, manifest) in sources.all().enumerate() {
-        let reads: Vec<Range<usize>> = plans.iter().filter_map(|plan| plan.reads(side)).collect();
+        let of_statistics = plans.iter().filter_map(|plan| plan.reads(side));
+        let of_anomalies = plans.iter().zip(are_held).filter(|(_, is_held)| **is_held);
+        let of_anomalies = of_anomalies.filter_map(|(plan, _)| plan.anomaly_reads(side));
+        let reads: Vec<Range<usize>> = of_statistics.chain(of_anomalies).collect();
         let first = reads.iter().map(|steps| steps.start).min();
         let end = reads.iter().map(|steps| steps.end).max();
         let Some(steps) = first.zip(end).map(|(first, end)| first..end) else {

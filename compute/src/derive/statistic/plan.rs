@@ -144,6 +144,13 @@ impl Plan {
         }
     }
 
+    /// Steps of the first product that anomalies are of; none of a second.
+    pub(super) fn anomaly_reads(&self, side: usize) -> Option<Range<usize>> {
+        let ends = self.anomalies_of.first().zip(self.anomalies_of.last());
+        let (first, last) = ends.filter(|_| side == 0)?;
+        Some(first.steps.start..last.steps.end)
+    }
+
     /// Was a version made of these very steps in this very way, so that its values are those that would be made?
     pub(super) fn has_values_of(&self, latest: &Manifest, source: &Manifest) -> bool {
         let made_of = latest.steps.iter().map(|step| step.raw_sha256);

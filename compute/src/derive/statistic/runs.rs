@@ -1,15 +1,21 @@
 //! Anomalies of runs of steps, where they are wanted: blocks of cells of the product along time in, means of their steps less the
-//! normals out, as its cube holds them. They are made twice, for fields and for the cube, which is quicker than to read the fields.
+//! normals out, as its cube holds them. Where they are not held they are made twice, for fields and for the cube, which is quicker than
+//! to read the fields.
 
 use std::ops::Range;
 use std::sync::Arc;
 
+use contract::chunk::Window;
 use contract::grid::Grid;
-use cube::{AtHand, BLOCK_CELLS, Block, RUN_STEPS, RunValues, Values};
+use cube::{AtHand, BLOCK_CELLS, RUN_STEPS, RunValues, Values};
 use futures::future::BoxFuture;
+use futures::{FutureExt as _, StreamExt as _, TryStreamExt as _, stream};
 use rayon::prelude::*;
 use storage::row_check::RowCheck;
 
+use super::blocks::{Blocks, GROUPS_AT_ONCE, Pieces};
+use super::encoded::{Damaged, Encoded};
+use super::held::{self, Held};
 use super::means::{MeanOf, Sum};
 use crate::ComputeError;
 
@@ -30,10 +36,9 @@ pub(super) struct Less {
 }
 
 impl Less {
-    /// An anomaly from a mean in one cell; no data is one NaN.
+    /// An anomaly from a mean in one cell.
     fn value(&self, anomaly: usize, place: usize, mean: f64) -> f32 {
-        let value = ((mean - self.normals[self.bins[anomaly]][place]) * self.factor) as f32;
-        if value.is_nan() { f32::NAN } else { value }
+        held::value(mean, self.normals[self.bins[anomaly]][place], self.factor)
     }
 
     /// An anomaly of every cell, of the sums of its steps, `[row, col]`.
@@ -43,35 +48,62 @@ impl Less {
         sums.iter().enumerate().map(value).collect()
     }
 
-    /// Adds the values of some steps to the anomalies of one block, `[step, cell]` of a whole one, of which the first is `first`.
-    /// What the steps leave incomplete is carried to the next ones: one anomaly a cell, since they follow each other.
-    fn add(
+    /// Some anomalies of one block, `[step, cell]` of a whole run and block, of its values at some steps, `[cell, step]`.
+    fn put(
         &self,
-        first: usize,
-        (steps, own): (&Range<usize>, &Block),
-        making: (&mut [f32], &mut [Sum]),
+        anomalies: &Range<usize>,
+        window: Window,
+        (steps, values): (&Range<usize>, &[f32]),
+        out: &mut [f32],
     ) {
-        let (out, carried) = making;
-        let window = own.window;
-        let of_run = &self.of[first..self.of.len().min(first + RUN_STEPS)];
-        let from = of_run.partition_point(|mean| mean.steps.end <= steps.start);
-        let to = of_run.partition_point(|mean| mean.steps.start < steps.end);
         let places = window.cell_indices(&self.grid);
-        for ((cell, place), values) in places.enumerate().zip(own.values.chunks_exact(steps.len()))
-        {
+        for ((cell, place), values) in places.enumerate().zip(values.chunks_exact(steps.len())) {
             let (down, right) = (cell / window.cols as usize, cell % window.cols as usize);
             let in_block = down * BLOCK_CELLS as usize + right;
-            let mut sum = carried[in_block];
-            for (at, mean) in (from..to).zip(&of_run[from..to]) {
-                for step in mean.steps.start.max(steps.start)..mean.steps.end.min(steps.end) {
-                    mean.add(&mut sum, step, values[step - steps.start]);
-                }
-                if mean.steps.end <= steps.end {
-                    out[at * CELLS + in_block] = self.value(first + at, place, mean.mean(sum));
-                    sum = Sum::default();
-                }
+            for (map, anomaly) in out.chunks_exact_mut(CELLS).zip(anomalies.clone()) {
+                let mean = self.of[anomaly].of(values, steps.start);
+                map[in_block] = self.value(anomaly, place, mean);
             }
-            carried[in_block] = sum;
+        }
+    }
+
+    /// Some anomalies of the blocks of a group, `[block, step, cell]` of whole blocks and runs, of what was found of them in some steps;
+    /// else what cannot be decoded, and where.
+    fn made(
+        &self,
+        found: Encoded,
+        pieces: Pieces,
+        anomalies: &Range<usize>,
+        steps: &Range<usize>,
+    ) -> Result<Vec<f32>, (Encoded, Damaged)> {
+        let block_values = CELLS * RUN_STEPS;
+        let mut all = vec![f32::NAN; found.windows().len() * block_values];
+        let mut found = found.split(pieces.each);
+        let piece_values = pieces.each * block_values;
+        let at_once = pieces.at_once.min(found.len()).max(1);
+        let mut damaged = None;
+        for (batch, all) in all.chunks_mut(piece_values * at_once).enumerate() {
+            let own = &found[batch * at_once..];
+            let making = all.par_chunks_mut(piece_values).zip(own).enumerate();
+            let made = making.try_for_each(|(piece, (mut out, encoded))| {
+                let values = encoded.values(steps).map_err(|damaged| (piece, damaged))?;
+                let mut values = values.as_slice();
+                for window in encoded.windows() {
+                    let (own, rest) = values.split_at(window.cell_count() * steps.len());
+                    let (of_block, later) = out.split_at_mut(block_values);
+                    self.put(anomalies, *window, (steps, own), of_block);
+                    (values, out) = (rest, later);
+                }
+                Ok(())
+            });
+            if let Err((piece, error)) = made {
+                damaged = Some((batch * at_once + piece, error));
+                break;
+            }
+        }
+        match damaged {
+            None => Ok(all),
+            Some((piece, damaged)) => Err((found.swap_remove(piece), damaged)),
         }
     }
 }
@@ -84,6 +116,13 @@ pub(super) struct MadeRun {
 }
 
 impl MadeRun {
+    fn of(values: RunValues) -> Self {
+        Self {
+            check: RowCheck::new().f32s(&values.values).finish(),
+            values,
+        }
+    }
+
     /// Tells of the cells that hold data in any step, by their places.
     pub(super) fn cells(&self, grid: &Grid, mut tell: impl FnMut(usize)) {
         let values = self.values.values.chunks_exact(CELLS * RUN_STEPS);
@@ -109,81 +148,93 @@ impl MadeRun {
 
 /// Makes runs of anomalies.
 pub(super) struct Runs {
-    pub(super) source: Values,
-    /// Rows and columns of the blocks in which any cell is wanted.
-    pub(super) blocks: Vec<[u32; 2]>,
-    pub(super) less: Arc<Less>,
+    /// In which any cell is wanted.
+    pub(super) blocks: Arc<Blocks>,
+    pub(super) count: usize,
+    pub(super) of: AnomaliesOf,
+}
+
+/// Where anomalies are had from.
+pub(super) enum AnomaliesOf {
+    /// They were made with their normals.
+    Held(Arc<Held>),
+    /// They are made of the product.
+    Product { source: Values, less: Arc<Less> },
 }
 
 impl Runs {
     /// How many there are.
     pub(super) fn count(&self) -> usize {
-        self.less.of.len().div_ceil(RUN_STEPS)
+        self.count.div_ceil(RUN_STEPS)
     }
 
     /// The anomalies of one.
     pub(super) fn anomalies(&self, run: usize) -> Range<usize> {
-        run * RUN_STEPS..self.less.of.len().min((run + 1) * RUN_STEPS)
+        run * RUN_STEPS..self.count.min((run + 1) * RUN_STEPS)
     }
 
-    /// Reads and makes one; of the product no more is held than one run of its own.
+    /// Makes one.
     pub(super) async fn make(&self, run: usize) -> Result<MadeRun, ComputeError> {
-        let own = self.anomalies(run);
-        let (first, of) = (own.start, &self.less.of[own]);
+        let anomalies = self.anomalies(run);
+        match &self.of {
+            AnomaliesOf::Held(held) => {
+                let (held, blocks) = (Arc::clone(held), Arc::clone(&self.blocks));
+                off_thread(move || MadeRun::of(held.run(&blocks, anomalies))).await
+            }
+            AnomaliesOf::Product { source, less } => {
+                let values = self.made(source, less, anomalies).await?;
+                off_thread(move || MadeRun::of(values)).await
+            }
+        }
+    }
+
+    /// Reads the product and makes one run, on all processors.
+    async fn made(
+        &self,
+        source: &Values,
+        less: &Arc<Less>,
+        anomalies: Range<usize>,
+    ) -> Result<RunValues, ComputeError> {
+        let of = &less.of[anomalies.clone()];
         let ends = of.first().zip(of.last());
         let steps = ends.map_or(0..0, |(first, last)| first.steps.start..last.steps.end);
-        let mut making = Making {
-            values: vec![f32::NAN; self.blocks.len() * CELLS * RUN_STEPS],
-            carried: vec![Sum::default(); self.blocks.len() * CELLS],
+        let groups = self.blocks.groups(steps.len());
+        let pieces = groups.pieces;
+        let make = |windows: Vec<Window>| {
+            let (less, anomalies, steps) = (Arc::clone(less), anomalies.clone(), steps.clone());
+            async move {
+                let found = Encoded::find(source, windows, steps.clone()).await?;
+                let made = off_thread(move || less.made(found, pieces, &anomalies, &steps)).await?;
+                match made {
+                    Ok(made) => Ok(made),
+                    Err((encoded, damaged)) => Err(encoded.error(damaged).await),
+                }
+            }
+            .boxed()
         };
-        for piece in self.source.runs() {
-            let piece = piece.start.max(steps.start)..piece.end.min(steps.end);
-            if piece.is_empty() {
-                continue;
+        let mut making = stream::iter(groups.of_blocks().map(<[Window]>::to_vec))
+            .map(make)
+            .buffered(GROUPS_AT_ONCE);
+        let mut values = vec![];
+        while let Some(mut made) = making.try_next().await? {
+            if values.is_empty() {
+                values = made;
+            } else {
+                values.append(&mut made);
             }
-            let read = self.source.blocks(&self.blocks, piece.clone()).await?;
-            let less = Arc::clone(&self.less);
-            making = off_thread(move || {
-                making.take(&less, first, (&piece, &read));
-                making
-            })
-            .await?;
         }
-        let blocks = self.blocks.clone();
-        off_thread(move || {
-            let values = making.values;
-            MadeRun {
-                check: RowCheck::new().f32s(&values).finish(),
-                values: RunValues { blocks, values },
-            }
-        })
-        .await
+        drop(making);
+        let blocks = self.blocks.at();
+        Ok(RunValues { blocks, values })
     }
 }
 
-async fn off_thread<T: Send + 'static>(
+/// Does something that takes processors.
+pub(super) async fn off_thread<T: Send + 'static>(
     work: impl FnOnce() -> T + Send + 'static,
 ) -> Result<T, ComputeError> {
     let worked = tokio::task::spawn_blocking(work).await;
-    worked.map_err(|e| ComputeError::inconsistent("an anomaly", e))
-}
-
-/// A run on its way.
-struct Making {
-    /// `[block, step, cell]` of whole blocks.
-    values: Vec<f32>,
-    /// Of each cell of each block what the anomaly that is not complete has come to.
-    carried: Vec<Sum>,
-}
-
-impl Making {
-    fn take(&mut self, less: &Less, first: usize, (steps, read): (&Range<usize>, &[Block])) {
-        let values = self.values.par_chunks_mut(CELLS * RUN_STEPS);
-        let making = values.zip(self.carried.par_chunks_mut(CELLS));
-        making.zip(read).for_each(|((values, carried), own)| {
-            less.add(first, (steps, own), (values, carried));
-        });
-    }
+    worked.map_err(|e| ComputeError::inconsistent("a statistic", e))
 }
 
 /// Anomalies that fields were made of, for their cube.
