@@ -230,6 +230,8 @@ class Ours:
 
     def warm(self, what, variants):
         """Brings what questions read into the page cache, where the peer's files are too, and begins again without an answer."""
+        # The peer may have taken longer than a server waits for another request.
+        self.connection.close()
         for parameters in variants:
             self.ask(what, "arrow", **parameters)
         self.stop()
