@@ -37,23 +37,22 @@ impl Landing<'_> {
     ) -> Result<Made, ComputeError> {
         let (plan, source, engine) = (self.plan, self.sources.first, self.engine);
         let blocks = Arc::new(Blocks::of(engine, &source.grid, self.wanted));
-        let of = match computed.held {
-            Some(held) => AnomaliesOf::Held(Arc::new(held)),
-            None => {
-                let bin = |output: &Output| plan.parts.of_period(output.period);
-                let less = Arc::new(Less {
-                    grid: source.grid,
-                    of: Arc::clone(&plan.anomalies_of),
-                    bins: plan.outputs.iter().map(bin).collect(),
-                    normals: computed.maps,
-                    factor: plan.factor,
-                });
-                if !blocks.are_held_in_runs() {
-                    return Ok((self.by_fields(&less, progress).await?, None));
-                }
-                let source = engine.values(source, &source.id()).await?;
-                AnomaliesOf::Product { source, less }
+        let of = if let Some(held) = computed.held {
+            AnomaliesOf::Held(Arc::new(held))
+        } else {
+            let bin = |output: &Output| plan.parts.of_period(output.period);
+            let less = Arc::new(Less {
+                grid: source.grid,
+                of: Arc::clone(&plan.anomalies_of),
+                bins: plan.outputs.iter().map(bin).collect(),
+                normals: computed.maps,
+                factor: plan.factor,
+            });
+            if !blocks.are_held_in_runs() {
+                return Ok((self.by_fields(&less, progress).await?, None));
             }
+            let source = engine.values(source, &source.id()).await?;
+            AnomaliesOf::Product { source, less }
         };
         let mut at_hand = OfAnomalies {
             runs: Runs {
