@@ -19,6 +19,8 @@ import time
 WAITING = ["observations/it", "storage/it", "kafka-log/it", "tests/cluster"]
 CARGO = os.environ.get("CARGO", "cargo")
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+# How much of what a failed suite said is shown once more at the end, where people look first.
+LAST_LINES = 60
 shown = threading.Lock()
 
 
@@ -46,7 +48,7 @@ def suites():
 
 
 def run(name, command, folder, again, results, **more):
-    """Runs one suite, shows what it said, and notes how it ended."""
+    """Runs one suite, shows what it said, and notes how it ended and its last words."""
     start = time.monotonic()
     environment = {**os.environ, **more}
     ended = subprocess.run(
@@ -56,7 +58,7 @@ def run(name, command, folder, again, results, **more):
     with shown:
         print(f"\n===== {name}: {' '.join(command)}", flush=True)
         print(ended.stdout, flush=True)
-    results.append((name, ended.returncode, seconds, again))
+    results.append((name, ended.returncode, seconds, again, ended.stdout.splitlines()[-LAST_LINES:]))
 
 
 def lane(names, found, results):
@@ -86,10 +88,11 @@ def main():
     for thread in threads:
         thread.join()
     print("\n===== all suites")
-    for name, code, seconds, _ in sorted(results, key=lambda result: -result[2]):
+    for name, code, seconds, *_ in sorted(results, key=lambda result: -result[2]):
         print(f"{seconds:7.1f} s  {'ok' if code == 0 else 'FAILED'}  {name}")
-    failed = [(name, again) for name, code, _, again in results if code != 0]
-    for name, again in failed:
+    failed = [(name, again, last_words) for name, code, _, again, last_words in results if code != 0]
+    for name, again, last_words in failed:
+        print(f"\n===== why {name} failed", *last_words, sep="\n")
         server = "" if name == "lints" else "deploy/with-services.sh "
         print(f"again: {server}{again}")
     sys.exit(1 if failed else 0)

@@ -405,7 +405,9 @@ async fn anomalies_are_the_same_along_time_as_of_fields_and_damaged_runs_are_nam
     // Runs are the largest.
     chunks.sort_by_key(|(content, _)| content.len());
     for (mut content, key) in chunks.split_off(chunks.len() - 6) {
-        content.iter_mut().for_each(|byte| *byte ^= 1);
+        for byte in &mut content {
+            *byte ^= 1;
+        }
         store.put_over(&key, content.into()).await.unwrap();
     }
     let error = derive("damaged").await.unwrap_err().to_string();
