@@ -32,4 +32,6 @@ pub use answer::{statistics, statistics_of};
 pub(crate) use over_steps::{RegionOnGrid, sums_over_region};
 pub(crate) use percentiles::least_part;
 pub(crate) use region_sums::RegionStepSums;
+#[cfg(test)]
+pub(crate) use run::tests::{sql_of, task_of_pieces};
 pub(crate) use tasks::are_fields_less;

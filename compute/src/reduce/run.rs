@@ -132,4 +132,4 @@ fn only_part(batches: &[RecordBatch]) -> Result<Option<Accumulated>, ComputeErro
 }
 
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;

@@ -50,11 +50,17 @@ fn pieces(count: u32) -> Vec<Piece> {
     (0..count).map(piece).collect()
 }
 
-fn all(count: u32) -> Task {
+/// A question of so many pieces, in one task.
+pub(crate) fn task_of_pieces(count: u32) -> Task {
     Task {
         question: question(),
         pieces: pieces(count),
     }
+}
+
+/// What a client asks a cluster.
+pub(crate) fn sql_of(task: &Task) -> String {
+    sql(std::slice::from_ref(task))
 }
 
 async fn plan(tasks: &[Task]) -> String {
@@ -74,7 +80,7 @@ async fn plan(tasks: &[Task]) -> String {
 #[test]
 fn every_piece_is_in_one_task_and_no_task_is_idle() {
     for (pieces_count, places) in [(9, 4), (2, 7), (1, 1), (0, 5), (100, 3)] {
-        let tasks = all(pieces_count).dealt(places);
+        let tasks = task_of_pieces(pieces_count).dealt(places);
         assert!(tasks.len() <= (pieces_count as usize).max(1));
         assert!(tasks.len() >= (pieces_count as usize).min(places));
         assert!(pieces_count == 0 || tasks.iter().all(|task| !task.pieces.is_empty()));
@@ -178,7 +184,7 @@ fn a_task_has_steps_side_by_side_and_is_told_of_no_others() {
 #[tokio::test]
 async fn a_task_whose_values_are_not_along_time_here_says_so_instead_of_reading_others() {
     let store = Store::memory();
-    let run = async |objects: &Objects| all(2).run(objects).await;
+    let run = async |objects: &Objects| task_of_pieces(2).run(objects).await;
     let (root, objects) = store.sql_root();
     assert_eq!(run(&Objects::new(root, objects)).await.unwrap(), None);
     // Nor is the version of this store.
@@ -187,7 +193,7 @@ async fn a_task_whose_values_are_not_along_time_here_says_so_instead_of_reading_
 
 #[tokio::test(flavor = "multi_thread")]
 async fn nothing_but_what_tasks_accumulated_passes_from_part_to_part() {
-    let tasks = all(9).dealt(4);
+    let tasks = task_of_pieces(9).dealt(4);
     let plan = plan(&tasks).await;
     let count = |word: &str| plan.matches(word).count();
     assert_eq!(count("AsyncFuncExec"), tasks.len(), "{plan}");
