@@ -22,10 +22,11 @@ use contract::manifest::{MANIFEST_SCHEMA, Manifest, Step};
 use contract::masked::MaskedCells;
 use futures::future::BoxFuture;
 use storage::domain::Cells;
-use storage::{StorageError, domain, manifests};
+use storage::{domain, manifests};
 
 use crate::expression::unit::Unit;
 use crate::functions::{COMPUTED_EXTENT, COMPUTED_FIELD};
+use crate::publish::{IsStillAsked, check_asked, publish_if};
 use crate::{ComputeError, DeriveProgress, Engine, catalogue};
 use job::{ExtentMade, ExtentTask, FieldMade, FieldTask, Job};
 use make::Maker;
@@ -40,8 +41,6 @@ const RUN_VALUES: usize = 64 << 20;
 const LEAST_RUN: usize = 16;
 /// Steps that are asked of the engine at a time, so that progress is told.
 const STEPS_AT_A_TIME: usize = 1024;
-/// How often the commit is tried again when another writer takes the number.
-const COMMIT_ATTEMPTS: u32 = 5;
 
 /// What came of it.
 #[derive(Debug, Clone, PartialEq)]
@@ -66,9 +65,23 @@ pub fn compute<'a>(
     request: &'a Request,
     progress: &'a (dyn Fn(DeriveProgress) + Send + Sync),
 ) -> BoxFuture<'a, Result<Outcome, ComputeError>> {
+    compute_if(engine, request, None, progress)
+}
+
+/// The same, landed only if the newest version of the product still asks for it.
+///
+/// # Errors
+/// As there; `AskedOtherwise`, with nothing landed.
+pub(crate) fn compute_if<'a>(
+    engine: &'a Engine,
+    request: &'a Request,
+    is_still_asked: Option<&'a IsStillAsked<'a>>,
+    progress: &'a (dyn Fn(DeriveProgress) + Send + Sync),
+) -> BoxFuture<'a, Result<Outcome, ComputeError>> {
     Box::pin(async move {
         let plan = Plan::of(engine, request).await?;
         let latest = manifests::latest(engine.store(), &request.target).await?;
+        check_asked((&request.target, latest.as_ref()), is_still_asked)?;
         if let Some(latest) = &latest {
             fits_what_is_there(latest, &plan.job)?;
             // Nothing was made of what is not there.
@@ -90,7 +103,7 @@ pub fn compute<'a>(
         let domain = plan.extent(engine, &steps).await?;
         let manifest = plan.manifest(request, steps, domain);
         Ok(Outcome {
-            manifest: commit(engine, manifest).await?,
+            manifest: publish_if(engine, manifest, None, is_still_asked).await?,
             kept_count,
             left_out,
             outside,
@@ -413,38 +426,4 @@ fn citation(how: &Computation, inputs: &[Input]) -> String {
         Computation::Statistic { statistic, .. } => format!("{statistic} of every cell"),
     };
     format!("{what}; {}", inputs.join("; "))
-}
-
-/// Publishes the manifest under the next free number and brings its cube there, unless just that is there.
-async fn commit(engine: &Engine, mut computed: Manifest) -> Result<Manifest, ComputeError> {
-    let store = engine.store();
-    let mut attempt = 1;
-    loop {
-        let latest = manifests::latest(store, &computed.product).await?;
-        if let Some(latest) = &latest {
-            manifests::settle(store, latest, &mut computed).await?;
-        }
-        let number = latest.as_ref().map_or(1, |latest| latest.number + 1);
-        let same = |latest: &Manifest| {
-            let number = latest.number;
-            *latest
-                == Manifest {
-                    number,
-                    ..computed.clone()
-                }
-        };
-        if let Some(latest) = latest.filter(same) {
-            cube::keep_up(store, &latest).await;
-            return Ok(latest);
-        }
-        computed.number = number;
-        match manifests::commit(store, &computed).await {
-            Ok(version) => {
-                cube::keep_up_as(store, &computed, &version).await;
-                return Ok(computed);
-            }
-            Err(StorageError::Conflict { .. }) if attempt < COMMIT_ATTEMPTS => attempt += 1,
-            Err(e) => return Err(e.into()),
-        }
-    }
 }

@@ -15,9 +15,12 @@ use contract::quantity::Quantity;
 use futures::future::BoxFuture;
 use storage::{Store, manifests};
 
-use crate::computed::{Request, compute};
-use crate::derive::{StatisticRequest, chosen_start, derive_statistics};
-use crate::{ComputeError, Engine, catalogue, derive_accumulated};
+use crate::computed::{Request, compute_if};
+use crate::derive::{
+    Progress, StatisticRequest, chosen_start, derive_accumulated_if, derive_statistics_if,
+};
+use crate::publish::{IsStillAsked, MADE_AGAIN, first_instant};
+use crate::{ComputeError, Engine, catalogue};
 use order::Order;
 use recipe::Recipe;
 pub use recipe::why_it_stays;
@@ -31,6 +34,18 @@ pub fn follow<'a>(
     engine: &'a Engine,
     product: &'a ProductId,
 ) -> BoxFuture<'a, Result<Vec<Manifest>, ComputeError>> {
+    follow_telling(engine, product, &|_progress| ())
+}
+
+/// The same, telling how far each derivation has come.
+///
+/// # Errors
+/// As there.
+pub fn follow_telling<'a>(
+    engine: &'a Engine,
+    product: &'a ProductId,
+    progress: &'a Progress<'a>,
+) -> BoxFuture<'a, Result<Vec<Manifest>, ComputeError>> {
     Box::pin(async move {
         let source = catalogue::product(engine.store(), product).await?;
         if is_accumulated(&source) {
@@ -38,23 +53,36 @@ pub fn follow<'a>(
         }
         let mut order = Order::of(product, recipes(engine.store()).await?);
         let mut changed = BTreeSet::from([product.clone()]);
-        let mut made = vec![];
+        let mut all = vec![];
         while let Some(next) = order.next() {
             // Where what it is made of was left, it is of what it was.
             let is_touched = |recipe: &Recipe| recipe.sources().any(|it| changed.contains(it));
-            let mut touched = vec![];
-            for (target, recipe) in next.iter().filter(|(_, recipe)| is_touched(recipe)) {
-                touched.extend(asked_now(engine.store(), target, recipe).await?);
+            let mut touched: BTreeMap<&ProductId, &Recipe> = next
+                .iter()
+                .filter(|(_, recipe)| is_touched(recipe))
+                .collect();
+            for _ in 0..MADE_AGAIN {
+                let mut asked = vec![];
+                for (target, recipe) in &touched {
+                    asked.extend(asked_now(engine.store(), target, recipe).await?);
+                }
+                let Made { newest, otherwise } = make(engine, &asked, progress).await?;
+                changed.extend(newest.iter().map(|manifest| manifest.product.clone()));
+                all.extend(newest);
+                touched.retain(|target, _| otherwise.contains(target));
+                if touched.is_empty() {
+                    break;
+                }
             }
-            let newest = make(engine, touched.iter().collect()).await?;
-            changed.extend(newest.iter().map(|manifest| manifest.product.clone()));
-            made.extend(newest);
+            for product in touched.keys() {
+                tracing::error!(%product, "is asked for otherwise again and again; it is made with the next version");
+            }
             order.done(next.keys());
         }
         for product in order.left() {
             tracing::error!(%product, "cannot be made again: it is made of itself, through others");
         }
-        Ok(made)
+        Ok(all)
     })
 }
 
@@ -112,53 +140,111 @@ fn is_accumulated(source: &Manifest) -> bool {
     source.quantity == Quantity::CarbonFlux && (source.derived_from.is_none() || is_by_step)
 }
 
+/// What came of making products.
+#[derive(Default)]
+struct Made {
+    newest: Vec<Manifest>,
+    /// Products that were asked for otherwise meanwhile, and are left as they are.
+    otherwise: BTreeSet<ProductId>,
+}
+
+impl Made {
+    /// Adds what came of a product.
+    ///
+    /// # Errors
+    /// What may pass; all else is told of.
+    fn add(
+        &mut self,
+        product: &ProductId,
+        made: Result<Vec<Manifest>, ComputeError>,
+    ) -> Result<(), ComputeError> {
+        match made {
+            Err(ComputeError::AskedOtherwise { product }) => _ = self.otherwise.insert(product),
+            made => self
+                .newest
+                .extend(told(product, made)?.into_iter().flatten()),
+        }
+        Ok(())
+    }
+}
+
 /// Makes a product, or statistics that read the same.
-async fn make(engine: &Engine, next: Vec<&Recipe>) -> Result<Vec<Manifest>, ComputeError> {
+async fn make(
+    engine: &Engine,
+    asked: &[Recipe],
+    progress: &Progress<'_>,
+) -> Result<Made, ComputeError> {
     let mut statistics = vec![];
-    let mut made = vec![];
-    for recipe in next {
+    let mut made = Made::default();
+    for recipe in asked {
         match recipe {
             Recipe::Accumulated(source) => {
+                let target = source.accumulated()?;
+                let before = manifests::latest(engine.store(), &target).await?;
+                let before = before.as_ref().map(first_instant);
+                let is_still_asked =
+                    |latest: Option<&Manifest>| latest.map(first_instant) == before;
+                let is_still_asked = Some(&is_still_asked as &IsStillAsked<'_>);
                 // A start that somebody chose stays as long as the product does.
                 let start = chosen_start(engine.store(), source).await?;
-                made.push(derive_accumulated(engine, source, start, &|_progress| ()).await?);
+                let derived =
+                    derive_accumulated_if(engine, source, start, is_still_asked, progress);
+                match derived.await {
+                    Err(ComputeError::AskedOtherwise { product }) => {
+                        made.otherwise.insert(product);
+                    }
+                    accumulated => made.newest.push(accumulated?),
+                }
             }
-            Recipe::Computed(request) => made.extend(computed(engine, request).await?),
+            Recipe::Computed(request) => {
+                let is_still_asked = |latest: Option<&Manifest>| {
+                    latest.and_then(Request::of).as_ref() == Some(&**request)
+                };
+                let outcome = compute_if(engine, request, Some(&is_still_asked), progress).await;
+                let computed = outcome.map(|outcome| vec![outcome.manifest]);
+                made.add(&request.target, computed)?;
+            }
             Recipe::Statistic(request) => statistics.push(&**request),
         }
     }
-    made.extend(of_cells(engine, &statistics).await?);
+    of_cells(engine, statistics, progress, &mut made).await?;
     Ok(made)
-}
-
-async fn computed(engine: &Engine, request: &Request) -> Result<Option<Manifest>, ComputeError> {
-    let outcome = compute(engine, request, &|_progress| ()).await;
-    told(&request.target, outcome.map(|outcome| outcome.manifest))
 }
 
 /// Statistics that read the same, together; each alone where one of them cannot be made.
 async fn of_cells(
     engine: &Engine,
-    requests: &[&StatisticRequest],
-) -> Result<Vec<Manifest>, ComputeError> {
-    let Some(first) = requests.first() else {
-        return Ok(vec![]);
-    };
-    let source = &first.product;
-    if requests.len() > 1 {
+    mut requests: Vec<&StatisticRequest>,
+    progress: &Progress<'_>,
+    all: &mut Made,
+) -> Result<(), ComputeError> {
+    let derived = async |requests: &[&StatisticRequest]| {
         let options: Vec<_> = requests.iter().map(|one| one.options.clone()).collect();
-        match derive_statistics(engine, source, &options, &|_progress| ()).await {
-            Err(error) if !error.is_retryable() => {}
-            made => return made,
+        let is_still_asked = |latest: Option<&Manifest>| {
+            let asked = latest.and_then(|latest| StatisticRequest::of(latest).ok().flatten());
+            asked.is_some_and(|asked| requests.contains(&&asked))
+        };
+        let source = &requests[0].product;
+        derive_statistics_if(engine, source, &options, Some(&is_still_asked), progress).await
+    };
+    while requests.len() > 1 {
+        match derived(&requests).await {
+            Err(ComputeError::AskedOtherwise { product }) => {
+                requests.retain(|one| one.target != product);
+                all.otherwise.insert(product);
+            }
+            Err(error) if error.is_retryable() => return Err(error),
+            Err(_) => break,
+            Ok(made) => {
+                all.newest.extend(made);
+                return Ok(());
+            }
         }
     }
-    let mut made = vec![];
     for request in requests {
-        let options = std::slice::from_ref(&request.options);
-        let alone = derive_statistics(engine, source, options, &|_progress| ()).await;
-        made.extend(told(&request.target, alone)?.into_iter().flatten());
+        all.add(&request.target, derived(&[request]).await)?;
     }
-    Ok(made)
+    Ok(())
 }
 
 /// What was made; nothing of what cannot be, which is told of.

@@ -5,13 +5,10 @@ mod at_cell;
 mod carried;
 mod derivation;
 pub(crate) mod exact;
-mod made_from;
 mod prior;
 mod source;
 mod statistic;
 mod steps;
-
-use std::sync::Arc;
 
 use contract::digest::Digest;
 use contract::event::Body;
@@ -19,21 +16,17 @@ use contract::manifest::Manifest;
 use contract::product::ProductId;
 use contract::quantity::Quantity;
 use contract::time::{Period, TimeMs};
-use cube::AtHand;
 use futures::future::BoxFuture;
-use storage::{StorageError, Store, manifests};
+use storage::{Store, manifests};
 
+use crate::publish::{IsStillAsked, MADE_AGAIN, check_asked, publish_if};
 use crate::workshop::Workshop;
 use crate::{ComputeError, Engine, catalogue};
 pub(crate) use at_cell::counts_at_cell;
 use derivation::Derivation;
-use made_from::is_from_newer;
 use source::{SourceStep, steps_since};
-pub(crate) use statistic::StatisticRequest;
+pub(crate) use statistic::{StatisticRequest, derive_statistics_if};
 pub use statistic::{derive_statistic, derive_statistics};
-
-/// How often the commit is tried again when another writer takes the number.
-const COMMIT_ATTEMPTS: u32 = 5;
 
 /// How far a derivation has come.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -60,9 +53,34 @@ pub fn derive_accumulated<'a>(
     progress: &'a Progress<'a>,
 ) -> BoxFuture<'a, Result<Manifest, ComputeError>> {
     Box::pin(async move {
+        for _ in 1..MADE_AGAIN {
+            match derive_accumulated_if(engine, product, start, None, progress).await {
+                // It was brought up to date meanwhile, from the start that it had before.
+                Err(ComputeError::AskedOtherwise { .. }) => {}
+                derived => return derived,
+            }
+        }
+        derive_accumulated_if(engine, product, start, None, progress).await
+    })
+}
+
+/// The same, published only if the newest version still asks for it.
+///
+/// # Errors
+/// As there; `AskedOtherwise`, with nothing published.
+pub(crate) fn derive_accumulated_if<'a>(
+    engine: &'a Engine,
+    product: &'a ProductId,
+    start: Option<TimeMs>,
+    is_still_asked: Option<&'a IsStillAsked<'a>>,
+    progress: &'a Progress<'a>,
+) -> BoxFuture<'a, Result<Manifest, ComputeError>> {
+    Box::pin(async move {
         let source = flux(engine.store(), product).await?;
         let steps = steps_since(&source, start)?;
-        let latest = manifests::latest(engine.store(), &product.accumulated()?).await?;
+        let target = product.accumulated()?;
+        let latest = manifests::latest(engine.store(), &target).await?;
+        check_asked((&target, latest.as_ref()), is_still_asked)?;
         if let Some(latest) = latest
             .as_ref()
             .filter(|latest| is_up_to_date(latest, &source, &steps))
@@ -72,11 +90,12 @@ pub fn derive_accumulated<'a>(
             cube::keep_up(engine.store(), latest).await;
             return Ok(latest.clone());
         }
-        derive(engine, &source, &steps, latest.as_ref(), progress).await
+        let of = (&source, &steps[..]);
+        derive(engine, of, latest.as_ref(), is_still_asked, progress).await
     })
 }
 
-/// The same with every step that ends after `from` computed anew, whatever is stored. If what comes out is what is
+/// [`derive_accumulated`] with every step that ends after `from` computed anew, whatever is stored. If what comes out is what is
 /// stored, no new version is made of it.
 pub fn derive_anew<'a>(
     engine: &'a Engine,
@@ -93,20 +112,21 @@ pub fn derive_anew<'a>(
             latest.steps.retain(|step| step.period.end <= from);
             latest
         });
-        derive(engine, &source, &steps, trusted.as_ref(), progress).await
+        let of = (&source, &steps[..]);
+        derive(engine, of, trusted.as_ref(), None, progress).await
     })
 }
 
 async fn derive(
     engine: &Engine,
-    source: &Manifest,
-    steps: &[SourceStep<'_>],
+    (source, steps): (&Manifest, &[SourceStep<'_>]),
     prior: Option<&Manifest>,
+    is_still_asked: Option<&IsStillAsked<'_>>,
     progress: &Progress<'_>,
 ) -> Result<Manifest, ComputeError> {
     let workshop = Workshop::of(engine.store());
     let derived = accumulated((engine, workshop), source, steps, prior, progress).await?;
-    commit(engine, derived).await
+    publish_if(engine, derived, None, is_still_asked).await
 }
 
 /// Computes and stores everything but the manifest, which is returned with number 0.
@@ -196,54 +216,6 @@ fn of_all(done_steps: usize, steps: &[SourceStep<'_>]) -> DeriveProgress {
         done_steps,
         all_steps: steps.len(),
     }
-}
-
-/// Publishes the manifest under the next free number, and brings its cube there, unless another writer published the same derivation meanwhile, or
-/// one of newer versions of what it is made from.
-async fn commit(engine: &Engine, derived: Manifest) -> Result<Manifest, ComputeError> {
-    commit_with(engine, derived, None).await
-}
-
-/// The same for who has the version's values at hand, which its cube is then made of.
-async fn commit_with(
-    engine: &Engine,
-    mut derived: Manifest,
-    at_hand: Option<Arc<dyn AtHand>>,
-) -> Result<Manifest, ComputeError> {
-    let mut attempt = 1;
-    loop {
-        let latest = manifests::latest(engine.store(), &derived.product).await?;
-        if let Some(latest) = &latest {
-            manifests::settle(engine.store(), latest, &mut derived).await?;
-        }
-        let number = latest.as_ref().map_or(1, |latest| latest.number + 1);
-        if let Some(latest) = latest.filter(|latest| is_no_older(latest, &derived)) {
-            cube::keep_up(engine.store(), &latest).await;
-            return Ok(latest);
-        }
-        let manifest = Manifest {
-            number,
-            ..derived.clone()
-        };
-        match manifests::commit(engine.store(), &manifest).await {
-            Ok(version) => {
-                cube::keep_up_with(engine.store(), &manifest, &version, at_hand).await;
-                return Ok(manifest);
-            }
-            Err(StorageError::Conflict { .. }) if attempt < COMMIT_ATTEMPTS => attempt += 1,
-            Err(e) => return Err(e.into()),
-        }
-    }
-}
-
-/// Is it what was derived, or something derived from newer versions?
-fn is_no_older(latest: &Manifest, derived: &Manifest) -> bool {
-    let same = Manifest {
-        number: latest.number,
-        schema: latest.schema,
-        ..derived.clone()
-    };
-    is_from_newer(latest, derived) || *latest == same
 }
 
 #[cfg(test)]

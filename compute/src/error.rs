@@ -70,6 +70,12 @@ pub enum ComputeError {
         /// What is wrong and what to do.
         reason: String,
     },
+    /// What was made again, since what it is made of changed, was asked for otherwise meanwhile: that stays.
+    #[error("{product} was asked for otherwise while it was made again")]
+    AskedOtherwise {
+        /// Product.
+        product: ProductId,
+    },
     /// SQL that makes no sense, or would do more than read.
     #[error("SQL: {reason}")]
     Sql {
@@ -200,7 +206,7 @@ impl ComputeError {
             Self::Cluster { source, .. } => {
                 retryable_if(failure::of_ballista(source) == Failure::Passing)
             }
-            Self::Overdue { .. } => ErrorClass::Retryable,
+            Self::Overdue { .. } | Self::AskedOtherwise { .. } => ErrorClass::Retryable,
             Self::Machine { .. } | Self::Metrics(_) | Self::Inconsistent { .. } => {
                 ErrorClass::Internal
             }

@@ -19,12 +19,14 @@ mod failure;
 pub mod flight_sql;
 pub mod functions;
 pub mod gc;
+mod made_from;
 pub mod matchup;
 mod objects;
 mod open_versions;
 #[cfg(test)]
 mod peak;
 pub mod point;
+mod publish;
 pub mod published;
 pub mod recompute;
 pub mod reduce;

@@ -2,15 +2,17 @@
 
 use std::fmt::{Display, Formatter};
 
-use serde::{Deserialize, Serialize};
+use serde::de::Visitor;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use sha2::{Digest as _, Sha256};
 
 use crate::ContractError;
 
 /// A SHA-256 digest, shown as 64 lower-case hexadecimal digits.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(try_from = "String", into = "String")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Digest([u8; 32]);
+
+const DIGITS: &[u8; 16] = b"0123456789abcdef";
 
 impl Digest {
     /// Digest of some bytes.
@@ -42,9 +44,27 @@ impl Digest {
     }
 }
 
+/// Digits of a digest. Manifests hold thousands: put by `write!` byte by byte they were most of the time of a long one.
+struct HexText([u8; 64]);
+
+impl HexText {
+    fn of(digest: &Digest) -> Self {
+        let mut text = [0; 64];
+        for (pair, byte) in text.chunks_exact_mut(2).zip(digest.0) {
+            pair[0] = DIGITS[usize::from(byte >> 4)];
+            pair[1] = DIGITS[usize::from(byte & 15)];
+        }
+        Self(text)
+    }
+
+    fn as_str(&self) -> &str {
+        str::from_utf8(&self.0).expect("digits are ASCII")
+    }
+}
+
 impl Display for Digest {
     fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
-        self.0.iter().try_for_each(|byte| write!(f, "{byte:02x}"))
+        f.write_str(HexText::of(self).as_str())
     }
 }
 
@@ -53,28 +73,47 @@ impl std::str::FromStr for Digest {
 
     fn from_str(s: &str) -> Result<Self, Self::Err> {
         let bad = || ContractError::invalid("digest", s, "64 lower-case hexadecimal digits");
-        if s.len() != 64 || !s.bytes().all(|b| matches!(b, b'0'..=b'9' | b'a'..=b'f')) {
+        let digit = |byte: u8| match byte {
+            b'0'..=b'9' => Some(byte - b'0'),
+            b'a'..=b'f' => Some(byte - b'a' + 10),
+            _ => None,
+        };
+        if s.len() != 64 {
             return Err(bad());
         }
         let mut bytes = [0; 32];
-        for (i, byte) in bytes.iter_mut().enumerate() {
-            *byte = u8::from_str_radix(&s[2 * i..2 * i + 2], 16).map_err(|_not_hex| bad())?;
+        for (byte, pair) in bytes.iter_mut().zip(s.as_bytes().chunks_exact(2)) {
+            let [high, low] = [pair[0], pair[1]].map(digit);
+            *byte = high
+                .zip(low)
+                .map(|(high, low)| high << 4 | low)
+                .ok_or_else(bad)?;
         }
         Ok(Self(bytes))
     }
 }
 
-impl TryFrom<String> for Digest {
-    type Error = ContractError;
-
-    fn try_from(s: String) -> Result<Self, Self::Error> {
-        s.parse()
+impl Serialize for Digest {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(HexText::of(self).as_str())
     }
 }
 
-impl From<Digest> for String {
-    fn from(digest: Digest) -> Self {
-        digest.to_string()
+impl<'de> Deserialize<'de> for Digest {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct OfText;
+        impl Visitor<'_> for OfText {
+            type Value = Digest;
+
+            fn expecting(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
+                f.write_str("64 lower-case hexadecimal digits")
+            }
+
+            fn visit_str<E: serde::de::Error>(self, text: &str) -> Result<Digest, E> {
+                text.parse().map_err(E::custom)
+            }
+        }
+        deserializer.deserialize_str(OfText)
     }
 }
 
@@ -90,5 +129,34 @@ mod tests {
             "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855"
         );
         assert_eq!(text.parse::<Digest>().unwrap(), Digest::of(b""));
+    }
+
+    #[test]
+    fn json_holds_the_digits_and_nothing_else_is_taken() {
+        for seed in 0..100_u8 {
+            let digest = Digest::of(&[seed]);
+            let byte_text = |byte: &u8| format!("{byte:02x}");
+            let text: Vec<String> = digest.as_bytes().iter().map(byte_text).collect();
+            let text = text.concat();
+            assert_eq!(digest.to_string(), text);
+            let json = serde_json::to_string(&digest).unwrap();
+            assert_eq!(json, format!("\"{text}\""));
+            assert_eq!(serde_json::from_str::<Digest>(&json).unwrap(), digest);
+            for bad in [
+                &text[1..],
+                &format!("{text}0"),
+                &text.to_uppercase(),
+                &text.replace('0', "g"),
+            ] {
+                let is_same = bad == text;
+                assert_eq!(bad.parse::<Digest>().is_ok(), is_same, "{bad}");
+                let json = format!("\"{bad}\"");
+                assert_eq!(
+                    serde_json::from_str::<Digest>(&json).is_ok(),
+                    is_same,
+                    "{bad}"
+                );
+            }
+        }
     }
 }

@@ -96,21 +96,7 @@ impl std::str::FromStr for ObjectKey {
     type Err = ContractError;
 
     fn from_str(s: &str) -> Result<Self, Self::Err> {
-        let part_is_safe = |part: &str| {
-            !matches!(part, "" | "." | "..")
-                && part
-                    .bytes()
-                    .all(|b| b.is_ascii_alphanumeric() || matches!(b, b'.' | b'_' | b'-'))
-        };
-        if s.len() <= 512 && s.split('/').all(part_is_safe) {
-            Ok(Self(s.to_owned()))
-        } else {
-            Err(ContractError::invalid(
-                "object key",
-                s,
-                "parts of A-Z a-z 0-9 . _ - joined by /",
-            ))
-        }
+        s.to_owned().try_into()
     }
 }
 
@@ -118,7 +104,21 @@ impl TryFrom<String> for ObjectKey {
     type Error = ContractError;
 
     fn try_from(s: String) -> Result<Self, Self::Error> {
-        s.parse()
+        let part_is_safe = |part: &str| {
+            !matches!(part, "" | "." | "..")
+                && part
+                    .bytes()
+                    .all(|b| b.is_ascii_alphanumeric() || matches!(b, b'.' | b'_' | b'-'))
+        };
+        if s.len() <= 512 && s.split('/').all(part_is_safe) {
+            Ok(Self(s))
+        } else {
+            Err(ContractError::invalid(
+                "object key",
+                &s,
+                "parts of A-Z a-z 0-9 . _ - joined by /",
+            ))
+        }
     }
 }
 

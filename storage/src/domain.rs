@@ -56,6 +56,26 @@ impl Cells {
         self.words[cell / WORD_BITS] >> (cell % WORD_BITS) & 1 == 1
     }
 
+    /// All of them, ascending.
+    pub fn iter(&self) -> impl Iterator<Item = usize> + '_ {
+        self.words.iter().enumerate().flat_map(|(at, word)| {
+            let mut left = *word;
+            std::iter::from_fn(move || {
+                let bit = left.trailing_zeros() as usize;
+                left &= left.checked_sub(1)?;
+                Some(at * WORD_BITS + bit)
+            })
+        })
+    }
+
+    /// Adds one.
+    ///
+    /// # Panics
+    /// The map has no such cell.
+    pub fn insert(&mut self, cell: usize) {
+        self.words[cell / WORD_BITS] |= 1 << (cell % WORD_BITS);
+    }
+
     /// Adds those of the cells from `first` on that hold a value; NaN is none.
     ///
     /// # Panics

@@ -3,13 +3,12 @@
 mod pages;
 mod published;
 
-use std::collections::BTreeSet;
-
+use contract::digest::Digest;
 use contract::key::ObjectKey;
 use contract::kind::Kind;
 use contract::manifest::{
-    MANIFEST_SCHEMA, Manifest, ManifestId, OLDEST_MANIFEST_SCHEMA, PAGED_SCHEMA, PagedManifest,
-    Step,
+    MANIFEST_SCHEMA, Manifest, ManifestId, OLDEST_MANIFEST_SCHEMA, PAGE_STEPS, PAGED_SCHEMA,
+    PagedManifest, Step,
 };
 use contract::product::ProductId;
 
@@ -137,14 +136,24 @@ pub async fn commit(store: &Store, manifest: &Manifest) -> Result<ManifestId, St
         let reason = format!("to write, it is of schema {}", manifest.schema);
         return Err(StorageError::damaged(key.as_str(), reason));
     }
-    let Some((paged, pages)) = manifest.paged() else {
+    // What the version before names is durable; all else is made so now, whoever may have had it once.
+    let before = ObjectKey::manifest(&manifest.product, manifest.number.saturating_sub(1));
+    let names = if manifest.steps.len() < PAGE_STEPS {
+        vec![]
+    } else {
+        page_names(store, &before).await?
+    };
+    let key_of = |name: &Digest| ObjectKey::manifest_page(&manifest.product, name);
+    let known = |at: usize| {
+        let name = *names.get(at)?;
+        Some((name, store.pages.get(&key_of(&name))?))
+    };
+    let Some((paged, pages)) = manifest.paged_after(known) else {
         document::put_new(store, &key, manifest).await?;
         return Ok(manifest.id());
     };
-    // What the version before names is durable; all else is made so now, whoever may have had it once.
-    let before = ObjectKey::manifest(&manifest.product, manifest.number.saturating_sub(1));
-    let named_before: BTreeSet<ObjectKey> = page_keys(store, &before).await?.into_iter().collect();
-    pages::write(store, &paged, pages, &named_before).await?;
+    let named_before = names.iter().map(key_of).collect();
+    pages::write(store, &manifest.product, pages, &named_before).await?;
     document::put_new(store, &key, &paged).await?;
     Ok(paged.id)
 }
@@ -153,6 +162,14 @@ pub async fn commit(store: &Store, manifest: &Manifest) -> Result<ManifestId, St
 pub async fn page_keys(store: &Store, key: &ObjectKey) -> Result<Vec<ObjectKey>, StorageError> {
     match stored(store, key).await? {
         Some(Stored::Paged(paged)) => Ok(paged.page_keys().collect()),
+        Some(Stored::Whole(_)) | None => Ok(vec![]),
+    }
+}
+
+/// Names of the pages of a stored manifest, in their order; nothing if it has none, or is not there.
+async fn page_names(store: &Store, key: &ObjectKey) -> Result<Vec<Digest>, StorageError> {
+    match stored(store, key).await? {
+        Some(Stored::Paged(paged)) => Ok(paged.pages),
         Some(Stored::Whole(_)) | None => Ok(vec![]),
     }
 }
@@ -231,9 +248,7 @@ async fn stored(store: &Store, key: &ObjectKey) -> Result<Option<Stored>, Storag
 #[cfg(test)]
 mod tests {
     use super::*;
-    use contract::digest::Digest;
     use contract::grid::Grid;
-    use contract::manifest::PAGE_STEPS;
     use contract::quantity::Quantity;
     use contract::time::{Period, TimeMs};
 

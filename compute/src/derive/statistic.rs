@@ -27,8 +27,9 @@ use contract::region::AskedRegion;
 use futures::future::BoxFuture;
 use storage::manifests;
 
-use super::made_from::made_from;
-use super::{Progress, commit_with};
+use super::Progress;
+use crate::made_from::made_from;
+use crate::publish::{IsStillAsked, MADE_AGAIN, check_asked, publish_if};
 use crate::{ComputeError, Engine};
 pub(crate) use kept::StatisticRequest;
 use landed::{Landing, computed};
@@ -71,11 +72,34 @@ pub fn derive_statistics<'a>(
     progress: &'a Progress<'a>,
 ) -> BoxFuture<'a, Result<Vec<Manifest>, ComputeError>> {
     Box::pin(async move {
+        for _ in 1..MADE_AGAIN {
+            match derive_statistics_if(engine, product, options, None, progress).await {
+                // Its product was brought up to date meanwhile, as it was asked for before.
+                Err(ComputeError::AskedOtherwise { .. }) => {}
+                made => return made,
+            }
+        }
+        derive_statistics_if(engine, product, options, None, progress).await
+    })
+}
+
+/// The same, each landed only if the newest version of its product still asks for it.
+///
+/// # Errors
+/// As there; `AskedOtherwise` of the first that does not, which is not landed. Those before it may be.
+pub(crate) fn derive_statistics_if<'a>(
+    engine: &'a Engine,
+    product: &'a ProductId,
+    options: &'a [MapOptions],
+    is_still_asked: Option<&'a IsStillAsked<'a>>,
+    progress: &'a Progress<'a>,
+) -> BoxFuture<'a, Result<Vec<Manifest>, ComputeError>> {
+    Box::pin(async move {
         let sources = Sources::read(engine, product, options).await?;
         let wanted = Arc::new(Wanted::of(&sources.first, one_region(options)?)?);
         let mut asked = vec![];
         for one in options {
-            asked.push(Asked::of(engine, sources.of(one)?, one).await?);
+            asked.push(Asked::of(engine, sources.of(one)?, one, is_still_asked).await?);
         }
         let is_twice =
             |one: &Asked<'_>| asked.iter().filter(|own| own.target == one.target).count() > 1;
@@ -101,7 +125,7 @@ pub fn derive_statistics<'a>(
                     continue;
                 }
                 Some(There::Renewed(renewed)) => {
-                    made.push(commit_with(engine, renewed, None).await?);
+                    made.push(publish_if(engine, renewed, None, is_still_asked).await?);
                     continue;
                 }
                 None => found.next(),
@@ -119,7 +143,7 @@ pub fn derive_statistics<'a>(
                 MapStatistic::Anomaly => landing.anomalies(computed, progress).await?,
                 _ => (landing.each(computed.maps).await?, None),
             };
-            made.push(commit_with(engine, derived, at_hand).await?);
+            made.push(publish_if(engine, derived, at_hand, is_still_asked).await?);
         }
         Ok(made)
     })
@@ -161,11 +185,14 @@ impl<'a> Asked<'a> {
         engine: &Engine,
         sources: SourcesOf<'a>,
         options: &MapOptions,
+        is_still_asked: Option<&IsStillAsked<'_>>,
     ) -> Result<Self, ComputeError> {
         let target = options.target(&sources.first.product)?;
         let plan = Plan::of(sources, options)?;
         let mut there = None;
-        if let Some(latest) = manifests::latest(engine.store(), &target).await? {
+        let latest = manifests::latest(engine.store(), &target).await?;
+        check_asked((&target, latest.as_ref()), is_still_asked)?;
+        if let Some(latest) = latest {
             let made_from = made_from(&latest).into_iter().map(|from| &from.product);
             if !made_from.eq(sources.products()) {
                 let reason = format!(

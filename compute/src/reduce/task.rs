@@ -22,8 +22,8 @@ use crate::objects::Objects;
 
 use crate::region::loaded::{RegionWeights, weights_failed};
 
-/// What the last tasks of a long question read, bytes before compression: some 40 ms, where to hand out a task takes 5 to 10.
-const LAST_TASK_BYTES: u64 = 32 << 20;
+/// What the last tasks of a long question read, bytes before compression: some 5 to 10 ms, where to hand out a task takes one to two.
+const LAST_TASK_BYTES: u64 = 8 << 20;
 
 /// Some pieces of a question, as they are handed to a process.
 #[derive(Debug, Clone, Serialize, Deserialize)]

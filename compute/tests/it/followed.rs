@@ -1,8 +1,11 @@
 //! Statistics of every cell brought up to date when what they are of has a newer version.
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use compute::computed::{Request, RequestedInput, compute};
-use compute::dependents::{follow, why_it_stays};
-use compute::derive::{derive_statistic, derive_statistics};
+use compute::dependents::{follow, follow_telling, why_it_stays};
+use compute::derive::{DeriveProgress, derive_statistic, derive_statistics};
 use compute::{Engine, derive_accumulated};
 use contract::analysis::{BasePeriod, MapStatistic};
 use contract::analysis::{CalendarBins, CorrelationStatistic, MapCorrelation, MapOptions};
@@ -354,6 +357,177 @@ async fn a_newer_version_of_the_same_steps_is_said_and_not_computed() {
     assert_eq!(
         followed(&engine, "sst").await,
         [("sst-climatology".to_owned(), 2)]
+    );
+}
+
+/// Brings up to date what is made of a product, while somebody asks for something as soon as its making has begun.
+async fn followed_while<F: Future<Output = ()> + Send + 'static>(
+    engine: &Engine,
+    name: &str,
+    asking: impl Fn() -> F + Send + Sync + 'static,
+) -> Vec<(String, u64)> {
+    let (has_begun, asking) = (AtomicBool::new(false), Arc::new(asking));
+    let on_progress = |_: DeriveProgress| {
+        if has_begun.swap(true, Ordering::Relaxed) {
+            return;
+        }
+        let asking = Arc::clone(&asking);
+        let other = std::thread::spawn(move || {
+            let runtime = tokio::runtime::Runtime::new().unwrap();
+            runtime.block_on(asking());
+        });
+        other.join().unwrap();
+    };
+    let made = follow_telling(engine, &product(name), &on_progress).await;
+    assert!(has_begun.load(Ordering::Relaxed), "nothing was made");
+    let made = made.unwrap().into_iter();
+    made.map(|it| (it.product.to_string(), it.number)).collect()
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn what_somebody_asks_for_while_it_is_made_again_is_not_replaced() {
+    let (_folder, store) = folder_store();
+    landed(&store, "sst", 60, 1).await;
+    let engine = Engine::in_process(store.clone(), parts(2));
+    let mean = named("mean", MapOptions::new(MapStatistic::Mean));
+    let max = named("max", MapOptions::new(MapStatistic::Max));
+    all_derived(&engine, &[mean.clone(), max]).await;
+    landed(&store, "sst", 66, 1).await;
+    let later = MapOptions {
+        from: "2003".parse().ok(),
+        ..mean
+    };
+    let (asker, asked) = (engine.clone(), later.clone());
+    let ask = move || {
+        let (engine, options) = (asker.clone(), asked.clone());
+        async move {
+            derive_statistic(&engine, &product("sst"), &options, &|_| ())
+                .await
+                .unwrap();
+        }
+    };
+    let mut made = followed_while(&engine, "sst", ask).await;
+    made.sort();
+    let expected = [("max", 2), ("mean", 2)];
+    assert_eq!(made, expected.map(|(name, at)| (name.to_owned(), at)));
+    let mean = latest(&store, "mean").await;
+    assert_eq!(mean.computed.as_ref().unwrap().from, later.from);
+    assert_eq!(mean.number, 2);
+
+    // A map that is to stay stays, though its making again had begun.
+    landed(&store, "sst", 72, 1).await;
+    let once = MapOptions {
+        once: true,
+        ..later
+    };
+    let asker = engine.clone();
+    let ask = move || {
+        let (engine, options) = (asker.clone(), once.clone());
+        async move {
+            derive_statistic(&engine, &product("sst"), &options, &|_| ())
+                .await
+                .unwrap();
+        }
+    };
+    let made = followed_while(&engine, "sst", ask).await;
+    assert_eq!(made, [("max".to_owned(), 3)]);
+    let mean = latest(&store, "mean").await;
+    assert!(mean.computed.unwrap().map.unwrap().once);
+    assert_eq!(mean.number, 3);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn carbon_is_accumulated_from_the_start_that_somebody_chooses_while_it_is_brought_up() {
+    let (_folder, store) = folder_store();
+    let flux = |count| {
+        let steps = months(count, 1).into_iter();
+        let small = |(period, values): (Period, Vec<f32>)| {
+            let values = values.iter().map(|value| value * 1e-10).collect();
+            (period, values)
+        };
+        steps.map(small).collect::<Vec<(Period, Vec<f32>)>>()
+    };
+    let name = product("flux");
+    land(&store, &name, Quantity::CarbonFlux, GRID, &flux(12)).await;
+    let engine = Engine::in_process(store.clone(), parts(2));
+    derive_accumulated(&engine, &name, None, &|_| ())
+        .await
+        .unwrap();
+    land(&store, &name, Quantity::CarbonFlux, GRID, &flux(14)).await;
+    let start = "2001-06".parse().ok();
+    let asker = engine.clone();
+    let ask = move || {
+        let engine = asker.clone();
+        async move {
+            let of = product("flux");
+            derive_accumulated(&engine, &of, start, &|_| ())
+                .await
+                .unwrap();
+        }
+    };
+    let made = followed_while(&engine, "flux", ask).await;
+    assert_eq!(made, [("flux-accumulated".to_owned(), 2)]);
+    let newest = latest(&store, "flux-accumulated").await;
+    assert_eq!(Some(newest.steps[0].period.start), start);
+    assert_eq!(newest.steps.len(), 9);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn what_somebody_asks_for_is_made_of_what_came_meanwhile() {
+    let (_folder, store) = folder_store();
+    landed(&store, "sst", 60, 1).await;
+    let engine = Engine::in_process(store.clone(), parts(2));
+    let mean = named("mean", MapOptions::new(MapStatistic::Mean));
+    all_derived(&engine, std::slice::from_ref(&mean)).await;
+    let later = MapOptions {
+        from: "2003".parse().ok(),
+        ..mean
+    };
+    // While it is computed more lands, and what was asked for before is brought up.
+    let has_begun = AtomicBool::new(false);
+    let other = (engine.clone(), store.clone());
+    let on_progress = |_: DeriveProgress| {
+        if has_begun.swap(true, Ordering::Relaxed) {
+            return;
+        }
+        let (engine, store) = other.clone();
+        let landing = std::thread::spawn(move || {
+            let runtime = tokio::runtime::Runtime::new().unwrap();
+            runtime.block_on(async {
+                landed(&store, "sst", 66, 1).await;
+                let made = followed(&engine, "sst").await;
+                assert_eq!(made, [("mean".to_owned(), 2)]);
+            });
+        });
+        landing.join().unwrap();
+    };
+    let made = derive_statistic(&engine, &product("sst"), &later, &on_progress).await;
+    let made = made.unwrap();
+    assert_eq!(made, latest(&store, "mean").await);
+    assert_eq!(made.computed.as_ref().unwrap().from, later.from);
+    assert_eq!(made.derived_from, Some(latest(&store, "sst").await.id()));
+    assert_eq!(made.number, 3);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn an_expression_that_somebody_changes_while_it_is_computed_again_stays_changed() {
+    let (_folder, store) = folder_store();
+    landed(&store, "sst", 12, 1).await;
+    let engine = Engine::in_process(store.clone(), parts(2));
+    computed(&engine, &expression("twice", "2 * sst", &["sst"])).await;
+    landed(&store, "sst", 14, 1).await;
+    let asker = engine.clone();
+    let ask = move || {
+        let engine = asker.clone();
+        async move { _ = computed(&engine, &expression("twice", "3 * sst", &["sst"])).await }
+    };
+    let made = followed_while(&engine, "sst", ask).await;
+    assert_eq!(made, [("twice".to_owned(), 2)]);
+    let twice = latest(&store, "twice").await;
+    let how = twice.computed.unwrap().how;
+    assert!(
+        matches!(&how, Computation::Expression { expression } if expression == "3 * sst"),
+        "{how:?}"
     );
 }
 

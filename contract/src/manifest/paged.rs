@@ -1,6 +1,8 @@
 //! A manifest as it is stored where it has many steps: all but the last ones in pages that never change, so that one more step
 //! costs the same however many there are. Pure.
 
+use std::sync::Arc;
+
 use serde::{Deserialize, Serialize};
 
 use super::{Manifest, ManifestId, Step};
@@ -139,23 +141,47 @@ impl PagedManifest {
 impl Manifest {
     /// Cuts it into pages; none if it has no steps for one, or holds what pages do not.
     pub fn paged(&self) -> Option<(PagedManifest, Vec<Page>)> {
+        let (paged, pages) = self.paged_after(|_at| None)?;
+        Some((paged, pages.into_iter().map(|(_name, page)| page).collect()))
+    }
+
+    /// The same, and of the pages, with their names, those that are not `before` in the same place, where that knows a page and its name: to name one takes
+    /// its whole JSON, to compare it takes little.
+    pub fn paged_after(
+        &self,
+        before: impl Fn(usize) -> Option<(Digest, Arc<Page>)>,
+    ) -> Option<(PagedManifest, Vec<(Digest, Page)>)> {
         let orders = self.notice_orders();
         let is_plain = self.series.is_empty() && NoticeRun::of(&orders) == self.notices;
         if self.steps.len() < PAGE_STEPS || !is_plain {
             return None;
         }
-        let page = |(steps, orders): (&[Step], &[_])| Page {
+        let page = |steps: &[Step], notices| Page {
             schema: PAGED_SCHEMA,
             steps: steps.to_vec(),
-            notices: NoticeRun::of(orders),
+            notices,
         };
-        let whole = self.steps.chunks_exact(PAGE_STEPS);
-        let rest = orders.chunks_exact(PAGE_STEPS).remainder();
-        let rest = page((whole.remainder(), rest));
-        let pages: Vec<Page> = whole
-            .zip(orders.chunks_exact(PAGE_STEPS))
-            .map(page)
-            .collect();
+        let (steps, orders) = (
+            self.steps.chunks_exact(PAGE_STEPS),
+            orders.chunks_exact(PAGE_STEPS),
+        );
+        let rest = page(steps.remainder(), NoticeRun::of(orders.remainder()));
+        let (mut names, mut new) = (vec![], vec![]);
+        for (at, (steps, orders)) in steps.zip(orders).enumerate() {
+            let notices = NoticeRun::of(orders);
+            let is_there = |there: &Page| {
+                there.schema == PAGED_SCHEMA && there.steps == steps && there.notices == notices
+            };
+            names.push(match before(at) {
+                Some((name, there)) if is_there(&there) => name,
+                _ => {
+                    let page = page(steps, notices);
+                    let name = page.name();
+                    new.push((name, page));
+                    name
+                }
+            });
+        }
         let paged = PagedManifest {
             schema: PAGED_SCHEMA,
             of_schema: self.schema,
@@ -165,13 +191,13 @@ impl Manifest {
             synthetic: self.synthetic,
             source: self.source.clone(),
             grid: self.grid,
-            pages: pages.iter().map(Page::name).collect(),
+            pages: names,
             rest,
             domain: self.domain.clone(),
             derived_from: self.derived_from.clone(),
             computed: self.computed.clone(),
         };
-        Some((paged, pages))
+        Some((paged, new))
     }
 }
 
@@ -241,6 +267,31 @@ mod tests {
             assert!(paged.with_pages(&other).is_err());
         }
         assert_eq!(manifest(PAGE_STEPS - 1).paged(), None);
+    }
+
+    #[test]
+    fn pages_that_are_known_are_compared_and_not_named_again() {
+        let (days, name) = (3 * PAGE_STEPS + 5, Digest::of(b"known"));
+        let (paged, pages) = manifest(days).paged().unwrap();
+        // A name that no page has shows whose name was taken.
+        let before = |at: usize| Some((name, Arc::new(pages[at].clone())));
+        let (same, new) = manifest(days).paged_after(before).unwrap();
+        assert_eq!((same.pages, new), (vec![name; 3], vec![]));
+        let mut changed = manifest(days);
+        changed.steps[PAGE_STEPS].valid_cells += 1;
+        let (other, new) = changed.paged_after(before).unwrap();
+        let page = changed.paged().unwrap().1[1].clone();
+        assert_eq!(new, [(page.name(), page)]);
+        assert_eq!(other.pages, [name, new[0].0, name]);
+        // Another place in the order of notices is another page.
+        let mut changed = manifest(days);
+        let mut orders = changed.notice_orders();
+        orders[0] = orders[7];
+        changed.notices = NoticeRun::of(&orders);
+        let (other, new) = changed.paged_after(before).unwrap();
+        assert_eq!(new.len(), 1);
+        assert_eq!(other.pages, [new[0].0, name, name]);
+        assert_ne!(other.pages[0], paged.pages[0]);
     }
 
     #[test]

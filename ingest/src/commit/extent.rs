@@ -1,5 +1,7 @@
 //! The cells that hold data in some step of the next version: only fields that come or go are read.
 
+mod along_time;
+
 use std::collections::BTreeSet;
 
 use contract::chunk::{BAND_CELLS, Window};
@@ -17,6 +19,11 @@ use crate::error::IngestError;
 /// Fields that are read at a time.
 pub(crate) const FIELDS_AT_ONCE: usize = 2;
 
+/// Fields that are looked through one by one before a cube is asked: most cells are found in the first.
+const FIELDS_AT_FIRST: usize = 2;
+/// Fields that are no more work than to open a cube.
+const FEW_FIELDS: usize = 16;
+
 /// Fields of a file that was just read, and the cells that hold a value in some of them.
 pub(super) struct Valued<'a> {
     pub(super) fields: BTreeSet<&'a ObjectKey>,
@@ -26,7 +33,8 @@ pub(super) struct Valued<'a> {
 /// Writes the domain of steps that follow the newest version.
 ///
 /// What was dropped or revised may have held the only value of a cell: of such cells other steps are looked at until each was
-/// found in one, which most are in the first; no further than the window that the rest lie in.
+/// found in one, which most are in the first; no further than the window that the rest lie in, and where steps are many, by what
+/// the product's cube says of 128 of them together.
 pub(crate) async fn write(
     store: &Store,
     product: &ProductId,
@@ -102,8 +110,7 @@ pub(super) async fn write_knowing(
     })
     .await?;
     if lost.is_any() {
-        let kept = steps.iter().rev().filter(|step| own.contains(&step.field));
-        look_for(store, grid, kept.map(|step| &step.field), &mut lost).await?;
+        look_through(store, (newest, steps), &mut lost).await?;
         cells.remove(&lost);
     }
     match newest {
@@ -161,6 +168,29 @@ async fn each(
         }
     }
     Ok(())
+}
+
+/// Takes cells away that hold data in steps of the newest version that the next one keeps.
+async fn look_through(
+    store: &Store,
+    (newest, steps): (Option<&Manifest>, &[Step]),
+    lost: &mut Cells,
+) -> Result<(), IngestError> {
+    let Some(newest) = newest else {
+        return Ok(());
+    };
+    let own = fields_of(&newest.steps);
+    let kept = steps.iter().rev().map(|step| &step.field);
+    let kept: Vec<&ObjectKey> = kept.filter(|field| own.contains(field)).collect();
+    let (first, rest) = kept.split_at(kept.len().min(FIELDS_AT_FIRST));
+    look_for(store, &newest.grid, first.iter().copied(), lost).await?;
+    let looked = if lost.is_any() && rest.len() > FEW_FIELDS {
+        along_time::look_for(store, newest, &fields_of(steps), lost).await
+    } else {
+        BTreeSet::new()
+    };
+    let rest = rest.iter().copied().filter(|field| !looked.contains(field));
+    look_for(store, &newest.grid, rest, lost).await
 }
 
 /// Takes cells away that hold data in some of these fields; of each no more is read than the window that the rest lie in.

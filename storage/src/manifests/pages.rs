@@ -3,8 +3,10 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
+use contract::digest::Digest;
 use contract::key::ObjectKey;
 use contract::manifest::{Manifest, Page, PagedManifest};
+use contract::product::ProductId;
 use futures::stream::{self, StreamExt as _, TryStreamExt as _};
 
 use crate::sound::damage;
@@ -35,13 +37,16 @@ async fn read(store: &Store, key: ObjectKey) -> Result<Arc<Page>, StorageError> 
     if let Some(page) = store.pages.get(&key) {
         return Ok(page);
     }
-    let Some(page) = document::get::<Page>(store, &key).await? else {
+    let Some(text) = document::text(store, &key).await? else {
         return Err(StorageError::damaged(
             key.as_str(),
             "a manifest names it, and it is not there",
         ));
     };
-    if !key.as_str().contains(&page.name().to_string()) {
+    let page: Page = serde_json::from_slice(&text).map_err(|e| damage::found(&key, e))?;
+    // As it is stored it is what it is named by; another writer of the same page may have set it otherwise.
+    let is_named = |name: Digest| key.as_str().contains(&name.to_string());
+    if !is_named(Digest::of(&text)) && !is_named(page.name()) {
         return Err(damage::found(&key, "its steps are not those of its name"));
     }
     let page = Arc::new(page);
@@ -49,14 +54,15 @@ async fn read(store: &Store, key: ObjectKey) -> Result<Arc<Page>, StorageError> 
     Ok(page)
 }
 
-/// Makes pages durable, but for those that are so because the version before names them.
+/// Makes pages of a product durable, but for those that are so because the version before names them.
 pub(super) async fn write(
     store: &Store,
-    paged: &PagedManifest,
-    pages: Vec<Page>,
+    product: &ProductId,
+    pages: Vec<(Digest, Page)>,
     named_before: &BTreeSet<ObjectKey>,
 ) -> Result<(), StorageError> {
-    let new = paged.page_keys().zip(pages);
+    let keyed = |(name, page)| (ObjectKey::manifest_page(product, &name), page);
+    let new = pages.into_iter().map(keyed);
     let new = new.filter(|(key, _)| !named_before.contains(key));
     stream::iter(new.collect::<Vec<_>>())
         .map(|(key, page)| async move {

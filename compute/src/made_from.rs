@@ -3,7 +3,7 @@
 use contract::manifest::{Manifest, ManifestId};
 
 /// The version that something was accumulated or a statistic made from, both of what is of two; none of anything else.
-pub(super) fn made_from(manifest: &Manifest) -> Vec<&ManifestId> {
+pub(crate) fn made_from(manifest: &Manifest) -> Vec<&ManifestId> {
     match &manifest.computed {
         None => manifest.derived_from.iter().collect(),
         Some(computed) if computed.how.is_by_step() => vec![],
@@ -12,7 +12,7 @@ pub(super) fn made_from(manifest: &Manifest) -> Vec<&ManifestId> {
 }
 
 /// Was one version made from newer versions than another of the same products, and from none that is older?
-pub(super) fn is_from_newer(latest: &Manifest, derived: &Manifest) -> bool {
+pub(crate) fn is_from_newer(latest: &Manifest, derived: &Manifest) -> bool {
     let (theirs, own) = (made_from(latest), made_from(derived));
     let is_of_same = theirs.iter().map(|id| &id.product);
     let is_of_same = is_of_same.eq(own.iter().map(|id| &id.product));
