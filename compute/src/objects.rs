@@ -23,6 +23,7 @@ use url::{Position, Url};
 
 use crate::ComputeError;
 use crate::open_versions::OpenVersions;
+use crate::reduce::held_shares::HeldShares;
 use crate::reduce::remembered::Remembered;
 use crate::region::computed::ComputedWeights;
 use crate::region::extent::Extent;
@@ -41,6 +42,7 @@ pub struct Objects {
     row_indexes: Arc<Cache<ObjectPath, Option<Arc<RowIndex>>, ByRows>>,
     extents: Arc<Cache<Digest, Extent>>,
     sums: Arc<Remembered>,
+    shares: Arc<HeldShares>,
     open_versions: Arc<OpenVersions>,
     /// Where functions that compute products store them.
     storing: Option<Storing>,
@@ -124,6 +126,7 @@ impl Objects {
             row_indexes: Arc::new(Cache::with_weighter(HELD_INDEXES, HELD_ROWS, ByRows)),
             extents: Arc::new(Cache::new(HELD_EXTENTS)),
             sums: Arc::default(),
+            shares: Arc::default(),
             open_versions: Arc::new(OpenVersions::new()),
             storing: None,
         }
@@ -257,6 +260,11 @@ impl Objects {
     /// Sums that were found before.
     pub(crate) fn remembered(&self) -> &Remembered {
         &self.sums
+    }
+
+    /// Shares of cells that were worked out last.
+    pub(crate) fn shares(&self) -> &HeldShares {
+        &self.shares
     }
 
     /// Versions whose values along time are held.

@@ -8,6 +8,7 @@ mod answer;
 mod bins;
 mod bytes;
 mod cells;
+pub(crate) mod held_shares;
 mod histogram;
 mod inside;
 mod kernel;

@@ -14,6 +14,7 @@ use crate::ComputeError;
 use crate::budget::fixed::OutOfRange;
 
 /// What cells have of a geometry, row by row.
+#[derive(Debug)]
 pub(super) enum CellShares {
     Weights(Vec<CellWeight>),
     Areas(Vec<CellArea>),

@@ -9,7 +9,7 @@ use super::reduction::CellShares;
 const MOST_BLOCKS: usize = 1 << 13;
 
 /// Shares of the cells of blocks, by the number of the block.
-#[derive(Default)]
+#[derive(Debug, Default)]
 pub(super) struct RememberedShares(Mutex<HashMap<u32, Arc<CellShares>>>);
 
 impl RememberedShares {

@@ -160,7 +160,7 @@ impl Worker {
         Ok(Self {
             whole: weights(&question.whole).await?,
             covered: weights(&question.covered).await?,
-            shares: Arc::default(),
+            shares: objects.shares().of(&question),
             objects: objects.clone(),
             question: Arc::new(question),
             values,

@@ -19,7 +19,7 @@ fn version() -> ManifestId {
     "p@1-0123abcd".parse().unwrap()
 }
 
-fn question() -> Question {
+pub(in crate::reduce) fn question() -> Question {
     Question {
         version: version(),
         shape: [16, 16],
