@@ -4,8 +4,8 @@ Of some 46,000 cells of the made-up China Sea (`fluxglobe generate china-sea --y
 climatology, the anomaly of every day and of every month, and the trend of every cell with its significance: Theil and Sen's slope through means of
 months, seasons taken off, with Mann and Kendall's test (variance after Hamed and Rao 1998), and least squares with an effective
 number of values (Santer et al. 2000). Both sides read what they have landed, files in the page cache, and store what they find:
-ours as products (fields, a cube in both layouts, levels), the peer as Zarr in its layout by time, which is its quickest for all of
-this. Its least squares are worked out over all cells at once by NumPy; Mann and Kendall's test is pymannkendall's, cell by cell on
+ours as products (fields, a cube in both layouts, levels) of the cells about the polygon (`--crop`), the peer as Zarr of the same box in its
+layout by time, which is its quickest for all of this. Anomalies of every day are also stored on all cells of the grid, as they are without `--crop`. Its least squares are worked out over all cells at once by NumPy; Mann and Kendall's test is pymannkendall's, cell by cell on
 all processors, of some cells, and the time of all is reckoned from theirs. All are compared before any figure is told.
 
 pymannkendall closes gaps: months on both sides of one are next to each other. With us a lag is a lag in time, so slopes and p values
@@ -40,6 +40,8 @@ ASKED = [CLIMATOLOGY, ANOMALY, TREND, LEAST_SQUARES, NORMALS, ALL]
 # The same with anomalies of means of months.
 ASKED_BY_MONTH = [ANOMALY, ALL]
 MONTHLY = "anomaly of months"
+# The same on the whole grid of the product.
+ON_ALL_CELLS = [ANOMALY, ALL]
 # Cells that the peer tests.
 TREND_CELLS = 1000
 # Values that a trend needs.
@@ -70,6 +72,7 @@ def main():
             try:
                 own_s = {" + ".join(asked): own.derive(asked) for asked in ASKED}
                 own_s |= {by_month(asked): own.derive(asked, step="month") for asked in ASKED_BY_MONTH}
+                own_s |= {on_all_cells(asked): own.derive(asked, crop=False) for asked in ON_ALL_CELLS}
                 worst = compared(own.exported(Path(work)), theirs)
             finally:
                 own.forget()
@@ -90,6 +93,10 @@ def by_month(asked):
     return " + ".join(asked).replace("anomaly", MONTHLY)
 
 
+def on_all_cells(asked):
+    return " + ".join(asked) + ", all cells"
+
+
 class Own:
     """Products that are derived, each under a name that no run before has taken: what is there already is not derived again."""
 
@@ -103,13 +110,14 @@ class Own:
         # Every file that is read was read before.
         self.derive(["mean"])
 
-    def derive(self, statistics, step=None):
+    def derive(self, statistics, step=None, crop=True):
         """Seconds of the whole command."""
-        tiles.say(f"fluxglobe: {', '.join(statistics)}{f' by {step}' if step else ''}")
+        tiles.say(f"fluxglobe: {', '.join(statistics)}{f' by {step}' if step else ''}{'' if crop else ', all cells'}")
         self.count += 1
         begin = time.perf_counter()
         words = ["--region", self.region, "--statistic", ",".join(statistics), "--least-percent", 0, "--name", self.named(statistics)]
         words += ["--step", step] if step else []
+        words += ["--crop"] if crop else []
         tiles.run(self.program, "--data", self.folder, "derive", "statistic", "--product", self.product, *words)
         seconds = time.perf_counter() - begin
         tiles.say(f"  {seconds:.2f} s")
@@ -399,6 +407,7 @@ def print_table(options, own_s, peer_s, cells, worst):
         MONTHLY: means + peer_s["anomalies of months stored"],
         by_month(ALL): climatology + means + peer_s["anomalies of months stored"] + peer_s["tests"],
     }
+    theirs |= {on_all_cells(asked): theirs[" + ".join(asked)] for asked in ON_ALL_CELLS}
     if options.json:
         print(json.dumps({"ours_s": own_s, "peer_s": theirs, "peer_parts_s": peer_s, "cells": cells, "differ": worst}, indent=1))
         return

@@ -91,15 +91,22 @@ impl Outage<'_> {
         );
     }
 
-    /// Work is sent, the part goes away in the middle of it, and comes back.
+    /// Work is sent and the part goes away, more is sent to what still answers, and the part comes back.
+    ///
+    /// Kafka takes nothing while it is away: what is sent when it is back tells whether everybody listens again.
     fn while_away(
         &mut self,
         part: &str,
         take_away: impl Fn(&Cluster),
         bring_back: impl Fn(&Cluster),
     ) {
+        let takes_work = part != "kafka";
         self.more();
         take_away(&self.cluster);
+        if takes_work {
+            // What was sent before may have landed before: this cannot have.
+            self.more();
+        }
         let mut most_bytes = 0;
         let begun = Instant::now();
         while begun.elapsed() < Duration::from_secs(self.seconds) {
@@ -122,6 +129,9 @@ impl Outage<'_> {
         );
         bring_back(&self.cluster);
         let back = Instant::now();
+        if !takes_work {
+            self.more();
+        }
         until_whole(&self.cluster, self.files.len());
         say(&format!(
             "{part} away for {} s: all landed and derived {:.1} s after it was back, at most {} MiB in one process",

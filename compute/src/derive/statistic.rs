@@ -15,6 +15,7 @@ mod quantity;
 mod ranges;
 mod runs;
 mod sources;
+mod stored;
 mod wanted;
 
 use std::sync::Arc;
@@ -35,6 +36,7 @@ pub(crate) use kept::StatisticRequest;
 use landed::{Landing, computed};
 use plan::Plan;
 use sources::{Sources, SourcesOf};
+use stored::Stored;
 use wanted::Wanted;
 
 /// Derives a statistic of each cell of the newest version of a product: [`derive_statistics`] of one.
@@ -97,9 +99,11 @@ pub(crate) fn derive_statistics_if<'a>(
     Box::pin(async move {
         let sources = Sources::read(engine, product, options).await?;
         let wanted = Arc::new(Wanted::of(&sources.first, one_region(options)?)?);
+        let stored = Stored::of(&sources.first.grid, options, &wanted)?;
         let mut asked = vec![];
         for one in options {
-            asked.push(Asked::of(engine, sources.of(one)?, one, is_still_asked).await?);
+            let own = Asked::of(engine, sources.of(one)?, (one, &stored), is_still_asked);
+            asked.push(own.await?);
         }
         let is_twice =
             |one: &Asked<'_>| asked.iter().filter(|own| own.target == one.target).count() > 1;
@@ -109,7 +113,7 @@ pub(crate) fn derive_statistics_if<'a>(
         }
         let plans = asked.iter().filter(|one| one.there.is_none());
         let plans: Vec<Plan> = plans.map(|one| one.plan.clone()).collect();
-        let found = computed(engine, &sources, &plans, &wanted, progress).await?;
+        let found = computed(engine, &sources, &plans, (&wanted, &stored), progress).await?;
         let mut found = found.into_iter();
         let mut made = vec![];
         for Asked {
@@ -138,6 +142,7 @@ pub(crate) fn derive_statistics_if<'a>(
                 target: &target,
                 plan: &plan,
                 wanted: &wanted,
+                stored: &stored,
             };
             let (derived, at_hand) = match plan.statistic {
                 MapStatistic::Anomaly => landing.anomalies(computed, progress).await?,
@@ -184,7 +189,7 @@ impl<'a> Asked<'a> {
     async fn of(
         engine: &Engine,
         sources: SourcesOf<'a>,
-        options: &MapOptions,
+        (options, stored): (&MapOptions, &Stored),
         is_still_asked: Option<&IsStillAsked<'_>>,
     ) -> Result<Self, ComputeError> {
         let target = options.target(&sources.first.product)?;
@@ -201,7 +206,7 @@ impl<'a> Asked<'a> {
                 );
                 return Err(ContractError::invalid("product", target.as_str(), reason).into());
             }
-            if plan.has_values_of(&latest, sources.first) {
+            if plan.has_values_of(&latest, stored) {
                 there = Some(if plan.is_said_by(&latest, sources.first) {
                     // Whoever published it may have been killed before the cube followed.
                     cube::keep_up(engine.store(), &latest).await;

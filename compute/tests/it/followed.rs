@@ -115,6 +115,13 @@ fn asked() -> Vec<MapOptions> {
             in_region("-27.3,34,-20.1,38", of(MapStatistic::Max)),
         ),
         named(
+            "cropped",
+            MapOptions {
+                crop: true,
+                ..in_region("-17,33,-14,38", of(MapStatistic::Max))
+            },
+        ),
+        named(
             "polygon",
             in_region(
                 "POLYGON((-29.1 33.3,-15.7 32.9,-20.2 39.6,-29.1 33.3))",
@@ -183,7 +190,7 @@ async fn statistics_follow_as_they_were_asked_for() {
         assert_eq!((own.number, &own.title), (2, &right.title));
         assert_eq!(own.steps, right.steps, "{}", own.product);
         assert_ne!(own.steps, before.steps, "{}", own.product);
-        assert_eq!(own.quantity, right.quantity);
+        assert_eq!((own.quantity, own.grid), (right.quantity, right.grid));
         // Asked again as it was asked for, it is what it is.
         let asked = asked()
             .into_iter()

@@ -37,6 +37,9 @@ pub struct MapOptions {
     /// Where: cells that lie in it, wholly or in part; everywhere if absent.
     #[serde(skip)]
     pub region: Option<AskedRegion>,
+    /// Is what is stored the cells about the region? Else all cells are, without data outside of it.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub crop: bool,
     /// Product that it becomes; `PRODUCT-STATISTIC` if absent, `-WITH` after it of a correlation, `-STEP` of anomalies of means, and
     /// `-REGION` of a named one.
     #[serde(skip)]
@@ -60,6 +63,7 @@ impl MapOptions {
             anomaly_step: None,
             correlation: None,
             region: None,
+            crop: false,
             name: None,
             once: false,
         }

@@ -21,6 +21,9 @@ pub struct MapRequest {
     /// Where; everywhere if absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub region: Option<KeptRegion>,
+    /// The product has the cells about the region, and not all of its source's.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub crop: bool,
     /// Made of the versions that were there, and by itself of none after them.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub once: bool,

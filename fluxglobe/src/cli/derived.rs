@@ -68,6 +68,10 @@ pub(crate) struct DeriveStatistic {
     /// file, the text of one, or PRODUCT:CODE of a landed mask. Every cell if absent.
     #[arg(long, allow_hyphen_values = true)]
     pub(crate) region: Option<String>,
+    /// Store only the cells about the region, out to whole blocks of 8 x 8: less to land and to keep of a small one. The product has a
+    /// grid of its own then, part of its source's. All cells of the source if absent, without data outside the region.
+    #[arg(long, requires = "region")]
+    pub(crate) crop: bool,
     /// Years of the climatology, both part of it: 1991/2020. All that the product covers if absent.
     #[arg(long, value_name = "FIRST/LAST")]
     pub(crate) base: Option<BasePeriod>,
@@ -151,6 +155,7 @@ impl DeriveStatistic {
                     .filter(|step| is_anomaly(statistic) && *step != TimeStep::Native),
                 correlation: correlation.clone().filter(|_| statistic.is_of_two()),
                 region: region.cloned(),
+                crop: self.crop,
                 name,
                 once: self.once,
                 ..MapOptions::new(*statistic)
@@ -215,6 +220,7 @@ mod tests {
             ("mean --trend-step year", "for trends"),
             ("climatology --step month", "anomalies"),
             ("mean --deseasonalise", "--with"),
+            ("mean --crop", "--region"),
         ] {
             let refused = asked(words).unwrap_err().to_string();
             assert!(refused.contains(reason), "{words}: {refused}");

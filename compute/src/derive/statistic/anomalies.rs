@@ -36,7 +36,7 @@ impl Landing<'_> {
         progress: &Progress<'_>,
     ) -> Result<Made, ComputeError> {
         let (plan, source, engine) = (self.plan, self.sources.first, self.engine);
-        let blocks = Arc::new(Blocks::of(engine, &source.grid, self.wanted));
+        let blocks = Arc::new(Blocks::of(engine, &source.grid, self.wanted, self.stored));
         let of = if let Some(held) = computed.held {
             AnomaliesOf::Held(Arc::new(held))
         } else {
@@ -66,9 +66,9 @@ impl Landing<'_> {
         Ok((manifest, Some(Arc::new(at_hand))))
     }
 
-    /// Fields that may be on their way at once.
-    fn at_once(&self) -> usize {
-        let (engine, cells) = (self.engine, self.sources.first.grid.cell_count());
+    /// Fields that may be on their way at once, of so many cells each.
+    fn at_once(&self, cells: usize) -> usize {
+        let engine = self.engine;
         let fields = engine.memory_bytes() / FIELDS_SHARE / (cells * CELL_BYTES).max(1);
         fields.clamp(1, ON_THEIR_WAY * engine.partitions().get())
     }
@@ -79,7 +79,7 @@ impl Landing<'_> {
         at_hand: &mut OfAnomalies,
         progress: &Progress<'_>,
     ) -> Result<Manifest, ComputeError> {
-        let grid = self.sources.first.grid;
+        let grid = self.stored.grid;
         let (mut found, mut checks) = (Found::nothing(grid.cell_count()), vec![]);
         let mut steps = vec![];
         let runs = &at_hand.runs;
@@ -99,7 +99,7 @@ impl Landing<'_> {
         let mut landing = made
             .map_ok(each)
             .try_flatten()
-            .try_buffered(self.at_once())
+            .try_buffered(self.at_once(grid.cell_count()))
             .boxed();
         let mut of_steps = Found::nothing(0);
         while let Some((step, of_step)) = landing.try_next().await? {
@@ -122,15 +122,16 @@ impl Landing<'_> {
         let anomaly = |anomaly| async move {
             let sums = self.sums(&less.of[anomaly]).await?;
             let less = Arc::clone(less);
-            let cells = sums.len();
-            let values = move || less.map(anomaly, &sums);
+            let stored = *self.stored;
+            let cells = stored.grid.cell_count();
+            let values = move || stored.map(less.map(anomaly, &sums));
             self.stored(anomaly, cells, values).await
         };
         let mut landing = stream::iter(0..less.of.len())
             .map(|number| anomaly(number).boxed())
-            .buffered(self.at_once())
+            .buffered(self.at_once(self.sources.first.grid.cell_count()))
             .boxed();
-        let mut found = Found::nothing(self.sources.first.grid.cell_count());
+        let mut found = Found::nothing(self.stored.grid.cell_count());
         let mut steps = vec![];
         while let Some((step, of_step)) = landing.try_next().await? {
             found.merge(&of_step);
@@ -162,7 +163,7 @@ impl Landing<'_> {
         cells: usize,
         values: impl FnOnce() -> Vec<f32> + Send + 'static,
     ) -> Result<(Step, Found), ComputeError> {
-        let (store, grid) = (self.engine.store(), self.sources.first.grid);
+        let (store, grid) = (self.engine.store(), self.stored.grid);
         let output = &self.plan.outputs[anomaly];
         let period = output.period;
         let making = move || {

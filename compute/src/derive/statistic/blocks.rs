@@ -8,7 +8,7 @@ use contract::grid::Grid;
 use contract::manifest::Manifest;
 use cube::{BLOCK_CELLS, RUN_STEPS, Values};
 
-use super::encoded;
+use super::stored::Stored;
 use super::wanted::Wanted;
 use crate::Engine;
 
@@ -35,8 +35,10 @@ pub(super) struct Reading<'a> {
 
 /// The blocks of a grid in which some cell is wanted.
 pub(super) struct Blocks {
-    /// Row by row from the north-west corner on.
+    /// Their cells in the grid.
     windows: Vec<Window>,
+    /// Rows and columns of them in the product that is stored, row by row from its north-west corner on.
+    at: Vec<[u32; 2]>,
     memory_bytes: usize,
 }
 
@@ -82,11 +84,13 @@ impl<'a> Groups<'a> {
 }
 
 impl Blocks {
-    /// Those of a grid.
-    pub(super) fn of(engine: &Engine, grid: &Grid, wanted: &Wanted) -> Self {
+    /// Those of a grid, in the order in which they are stored.
+    pub(super) fn of(engine: &Engine, grid: &Grid, wanted: &Wanted, stored: &Stored) -> Self {
         let mut windows = windows(grid, BLOCK_CELLS, BLOCK_CELLS);
         windows.retain(|window| wanted.is_any_of(grid, *window));
+        windows.sort_by_key(|window| stored.block(window));
         Self {
+            at: windows.iter().map(|window| stored.block(window)).collect(),
             windows,
             memory_bytes: engine.memory_bytes(),
         }
@@ -109,9 +113,9 @@ impl Blocks {
         run_bytes <= self.memory_bytes / RUN_SHARE
     }
 
-    /// Rows and columns of all of them.
+    /// Rows and columns of all of them in the product that is stored.
     pub(super) fn at(&self) -> Vec<[u32; 2]> {
-        encoded::at(&self.windows)
+        self.at.clone()
     }
 
     /// Their cells.

@@ -149,7 +149,7 @@ impl Encoded {
 }
 
 /// Rows and columns of blocks.
-pub(super) fn at(blocks: &[Window]) -> Vec<[u32; 2]> {
+fn at(blocks: &[Window]) -> Vec<[u32; 2]> {
     let at = |block: &Window| [block.row, block.col].map(|side| side / BLOCK_CELLS);
     blocks.iter().map(at).collect()
 }

@@ -44,6 +44,7 @@ pub(super) fn computed(sources: SourcesOf<'_>, options: &MapOptions) -> Computed
             bins: options.bins,
             anomaly_step: options.anomaly_step,
             region: options.region.as_ref().map(KeptRegion::of),
+            crop: options.crop,
             once: options.once,
         }),
     }
@@ -123,6 +124,7 @@ impl StatisticRequest {
                 from: computed.from,
                 to: computed.to,
                 region,
+                crop: map.crop,
                 name: Some(manifest.product.clone()),
                 once: map.once,
                 ..options

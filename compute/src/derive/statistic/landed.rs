@@ -21,6 +21,7 @@ use super::held::{Held, are_held};
 use super::plan::{Output, Plan};
 use super::runs::off_thread;
 use super::sources::{Sources, SourcesOf};
+use super::stored::Stored;
 use super::wanted::Wanted;
 use crate::{ComputeError, Engine};
 
@@ -34,11 +35,12 @@ pub(super) struct Landing<'a> {
     pub(super) target: &'a ProductId,
     pub(super) plan: &'a Plan,
     pub(super) wanted: &'a Wanted,
+    pub(super) stored: &'a Stored,
 }
 
 /// What was computed of one statistic.
 pub(super) struct Computed {
-    /// `[output][row, col]`, of anomalies their normals; stored unit, NaN where there is none.
+    /// `[output][row, col]` of the source, of anomalies their normals; stored unit, NaN where there is none.
     pub(super) maps: Vec<Vec<f64>>,
     /// Anomalies, if they are few.
     pub(super) held: Option<Held>,
@@ -49,7 +51,7 @@ pub(super) async fn computed(
     engine: &Engine,
     sources: &Sources,
     plans: &[Plan],
-    wanted: &Arc<Wanted>,
+    (wanted, stored): (&Arc<Wanted>, &Stored),
     progress: &Progress<'_>,
 ) -> Result<Vec<Computed>, ComputeError> {
     if plans.is_empty() {
@@ -57,7 +59,7 @@ pub(super) async fn computed(
     }
     let source = &sources.first;
     let cell_count = source.grid.cell_count();
-    let blocks = Blocks::of(engine, &source.grid, wanted);
+    let blocks = Blocks::of(engine, &source.grid, wanted, stored);
     let are_held = are_held(plans, &blocks, engine.memory_bytes());
     let periods: Vec<Period> = source.steps.iter().map(|step| step.period).collect();
     let of_cells = Arc::new(OfCells::new(plans, &are_held, &periods));
@@ -251,9 +253,11 @@ impl Landing<'_> {
     /// calendar, which is that of their periods.
     pub(super) async fn each(&self, all: Vec<Vec<f64>>) -> Result<Manifest, ComputeError> {
         let mut steps = vec![];
-        let mut found = Found::nothing(self.sources.first.grid.cell_count());
+        let mut found = Found::nothing(self.stored.grid.cell_count());
         for (output, values) in self.plan.outputs.iter().zip(all) {
-            let values: Vec<f32> = values
+            let values: Vec<f32> = self
+                .stored
+                .map(values)
                 .iter()
                 .map(|value| (value * self.plan.factor) as f32)
                 .collect();
@@ -265,7 +269,7 @@ impl Landing<'_> {
 
     /// Stores one step.
     async fn step(&self, output: &Output, values: &[f32]) -> Result<Step, ComputeError> {
-        let (store, grid) = (self.engine.store(), &self.sources.first.grid);
+        let (store, grid) = (self.engine.store(), &self.stored.grid);
         let field = fields::write(store, self.target, grid, values, output.period).await?;
         let valid_cells = values.iter().filter(|value| !value.is_nan()).count();
         Ok(output.step(field, valid_cells as u64))
@@ -296,7 +300,7 @@ impl Landing<'_> {
             quantity: plan.quantity.over(found.range)?,
             synthetic: sources.is_synthetic(),
             source: sources.citation(),
-            grid: source.grid,
+            grid: self.stored.grid,
             steps,
             domain: domain::write(self.engine.store(), target, &found.cells).await?,
             series: vec![],

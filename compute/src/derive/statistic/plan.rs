@@ -21,6 +21,7 @@ use super::parts_of_year::PartsOfYear;
 use super::quantity;
 use super::ranges::{Ranges, extent, inside, of_steps};
 use super::sources::SourcesOf;
+use super::stored::Stored;
 use crate::ComputeError;
 use crate::analysis::timeline::longest_s;
 
@@ -151,10 +152,10 @@ impl Plan {
         Some(first.steps.start..last.steps.end)
     }
 
-    /// Was a version made of these very steps in this very way, so that its values are those that would be made?
-    pub(super) fn has_values_of(&self, latest: &Manifest, source: &Manifest) -> bool {
+    /// Was a version made of these very steps in this very way, for these very cells, so that its values are those that would be made?
+    pub(super) fn has_values_of(&self, latest: &Manifest, stored: &Stored) -> bool {
         let made_of = latest.steps.iter().map(|step| step.raw_sha256);
-        latest.grid == source.grid
+        latest.grid == stored.grid
             && latest.quantity.is_same_kind(self.quantity)
             && made_of.eq(self.outputs.iter().map(|output| output.made_of))
     }

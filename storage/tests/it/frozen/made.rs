@@ -101,6 +101,7 @@ fn all() -> Vec<Manifest> {
         bins: CalendarBins::Season,
         anomaly_step: None,
         region: Some(KeptRegion::of(&region)),
+        crop: false,
         once: true,
     };
     let statistic = Computed {
