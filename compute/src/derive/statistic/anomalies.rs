@@ -43,6 +43,7 @@ impl Landing<'_> {
             let bin = |output: &Output| plan.parts.of_period(output.period);
             let less = Arc::new(Less {
                 grid: source.grid,
+                stored: *self.stored,
                 of: Arc::clone(&plan.anomalies_of),
                 bins: plan.outputs.iter().map(bin).collect(),
                 normals: computed.maps,
@@ -122,9 +123,8 @@ impl Landing<'_> {
         let anomaly = |anomaly| async move {
             let sums = self.sums(&less.of[anomaly]).await?;
             let less = Arc::clone(less);
-            let stored = *self.stored;
-            let cells = stored.grid.cell_count();
-            let values = move || stored.map(less.map(anomaly, &sums));
+            let cells = self.stored.grid.cell_count();
+            let values = move || less.map(anomaly, &sums);
             self.stored(anomaly, cells, values).await
         };
         let mut landing = stream::iter(0..less.of.len())
@@ -142,7 +142,7 @@ impl Landing<'_> {
         self.manifest(steps, &found).await
     }
 
-    /// What the steps of a mean come to in every cell.
+    /// What the steps of a mean come to in every cell that is stored.
     async fn sums(&self, mean: &MeanOf) -> Result<Vec<Sum>, ComputeError> {
         let source = self.sources.first;
         let mut sums = vec![Sum::default(); source.grid.cell_count()];
@@ -153,7 +153,7 @@ impl Landing<'_> {
                 mean.add(sum, step, *value);
             }
         }
-        Ok(sums)
+        Ok(self.stored.map(sums))
     }
 
     /// Stores an anomaly whose values are made on a thread of their own, and tells which of so many cells hold data.

@@ -40,7 +40,7 @@ pub(super) struct Landing<'a> {
 
 /// What was computed of one statistic.
 pub(super) struct Computed {
-    /// `[output][row, col]` of the source, of anomalies their normals; stored unit, NaN where there is none.
+    /// `[output][row, col]` of the cells that are stored, of anomalies their normals; stored unit, NaN where there is none.
     pub(super) maps: Vec<Vec<f64>>,
     /// Anomalies, if they are few.
     pub(super) held: Option<Held>,
@@ -58,7 +58,7 @@ pub(super) async fn computed(
         return Ok(vec![]);
     }
     let source = &sources.first;
-    let cell_count = source.grid.cell_count();
+    let cell_count = stored.grid.cell_count();
     let blocks = Blocks::of(engine, &source.grid, wanted, stored);
     let are_held = are_held(plans, &blocks, engine.memory_bytes());
     let periods: Vec<Period> = source.steps.iter().map(|step| step.period).collect();
@@ -70,7 +70,7 @@ pub(super) async fn computed(
     let room = |count| (count > 0).then(|| Held::nothing(count, blocks.cell_count()));
     let mut held: Vec<Option<Held>> = of_cells.anomaly_counts().map(room).collect();
     let readings = readings(engine, sources, plans, &are_held).await?;
-    let all_cells = wanted.count(0..cell_count);
+    let all_cells = wanted.count(0..source.grid.cell_count());
     let mut done = 0;
     let steps_of_all = readings.iter().map(|it| it.manifest.steps.len()).sum();
     let groups = blocks.groups(steps_of_all);
@@ -84,7 +84,7 @@ pub(super) async fn computed(
         for (cell, place) in found.places.iter().enumerate() {
             let values = &found.values[cell * outputs..][..outputs];
             for (output, value) in all.iter_mut().zip(values) {
-                output[*place] = *value;
+                output[stored.place(*place)] = *value;
             }
         }
         let mut anomalies = found.anomalies.as_slice();
@@ -255,9 +255,7 @@ impl Landing<'_> {
         let mut steps = vec![];
         let mut found = Found::nothing(self.stored.grid.cell_count());
         for (output, values) in self.plan.outputs.iter().zip(all) {
-            let values: Vec<f32> = self
-                .stored
-                .map(values)
+            let values: Vec<f32> = values
                 .iter()
                 .map(|value| (value * self.plan.factor) as f32)
                 .collect();

@@ -17,6 +17,7 @@ use super::blocks::{Blocks, GROUPS_AT_ONCE, Pieces};
 use super::encoded::{Damaged, Encoded};
 use super::held::{self, Held};
 use super::means::{MeanOf, Sum};
+use super::stored::Stored;
 use crate::ComputeError;
 
 /// Cells of a block.
@@ -25,11 +26,12 @@ const CELLS: usize = (BLOCK_CELLS * BLOCK_CELLS) as usize;
 /// What is taken off of what.
 pub(super) struct Less {
     pub(super) grid: Grid,
+    pub(super) stored: Stored,
     /// What each anomaly is of.
     pub(super) of: Arc<[MeanOf]>,
     /// Which normals are taken off each.
     pub(super) bins: Vec<usize>,
-    /// `[bin][row, col]`, stored unit, NaN where nothing is wanted or there is none.
+    /// `[bin][row, col]` of the cells that are stored, stored unit, NaN where nothing is wanted or there is none.
     pub(super) normals: Vec<Vec<f64>>,
     /// From the product's unit to that of anomalies.
     pub(super) factor: f64,
@@ -57,6 +59,7 @@ impl Less {
         out: &mut [f32],
     ) {
         let places = window.cell_indices(&self.grid);
+        let places = places.map(|place| self.stored.place(place));
         for ((cell, place), values) in places.enumerate().zip(values.chunks_exact(steps.len())) {
             let (down, right) = (cell / window.cols as usize, cell % window.cols as usize);
             let in_block = down * BLOCK_CELLS as usize + right;

@@ -66,6 +66,19 @@ impl Stored {
         ]
     }
 
+    /// Place in a map of the product, row-major, of a cell of such a block.
+    pub(super) fn place(&self, of_source: usize) -> usize {
+        let cols = self.source.cols as usize;
+        let (row, col) = (of_source / cols, of_source % cols);
+        let (top, left) = (self.part.row as usize, self.part.col as usize);
+        let right = if col < left {
+            col + cols - left
+        } else {
+            col - left
+        };
+        (row - top) * self.part.cols as usize + right
+    }
+
     /// Its cells of a map of the source, `[row, col]`.
     pub(super) fn map<T: Copy>(&self, map: Vec<T>) -> Vec<T> {
         if self.part == whole(&self.source) {
@@ -218,6 +231,7 @@ mod tests {
                     cols: 8,
                 };
                 assert_eq!(stored.block(&window), [of_product.0 / 8, of_product.1 / 8]);
+                assert_eq!(stored.place(*number as usize), place);
             }
         }
     }
