@@ -6,7 +6,7 @@ use std::sync::Arc;
 use futures::future::BoxFuture;
 
 use crate::blocks::with_decoder;
-use crate::record::{RECORD_BYTES, Record};
+use crate::record::{Numbers, RECORD_BYTES, Record};
 use crate::stored_chunks::{StoredChunks, Undecoded};
 use crate::sums::Basis;
 use crate::values::{Piece, Values};
@@ -33,21 +33,21 @@ impl EncodedSums {
     }
 
     /// Decodes one record after the other, in the order asked for, and hands over its place among those asked for; those that hold
-    /// nothing, neither of their block nor of any west of it, are left out. `take` says whether to go on. Squares of a record are those of
-    /// another one unless they are wanted.
+    /// nothing, neither of their block nor of any west of it, are left out. `take` says whether to go on. Numbers of a record that are
+    /// not wanted of it are those of another one.
     ///
     /// # Errors
     /// The first one that is damaged; [`EncodedSums::error`] makes an error of it.
     pub fn each(
         &self,
-        with_squares: bool,
+        wanted: impl Fn(usize) -> Numbers,
         mut take: impl FnMut(usize, &Record) -> bool,
     ) -> Result<(), Undecoded> {
         let (mut bytes, mut record) = (vec![0; RECORD_BYTES], Record::default());
         let decoded = with_decoder(|decoder| {
             self.content.in_order(|number, content| {
                 let read = decoder.chunks().decode(content, &mut bytes);
-                let read = read.and_then(|()| record.read(&bytes, with_squares));
+                let read = read.and_then(|()| record.read(&bytes, wanted(number)));
                 read.map_err(|reason| Undecoded(number, reason))?;
                 Ok(take(number, &record))
             })

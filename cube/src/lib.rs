@@ -79,7 +79,7 @@ pub use keys::Keys;
 pub use layout::{BLOCK_CELLS, Layout, RUN_STEPS};
 pub use plain::PlainZarr;
 pub use reader::{Cube, LevelWindow};
-pub use record::Record;
+pub use record::{Numbers, Record};
 pub use repository::{At, Repository};
 pub use stored_chunks::Undecoded;
 pub use sums::Basis;

@@ -71,11 +71,11 @@ impl Record {
         }
     }
 
-    /// Reads one of [`RECORD_BYTES`] bytes; squares stay what they are unless they are wanted.
+    /// Reads what is wanted of one of [`RECORD_BYTES`] bytes, and whether it holds sums; the rest stays what it is.
     ///
     /// # Errors
     /// It begins as no record does.
-    pub(crate) fn read(&mut self, bytes: &[u8], with_squares: bool) -> Result<(), String> {
+    pub(crate) fn read(&mut self, bytes: &[u8], wanted: Numbers) -> Result<(), String> {
         self.is_summed = match bytes.first() {
             Some(0) => true,
             Some(&UNSUMMED) => false,
@@ -85,78 +85,92 @@ impl Record {
                 ));
             }
         };
-        let mut rest = &bytes[HEADER_BYTES..];
-        let mut word = |count: usize| {
-            let (planes, others) = rest.split_at(count * RUN_STEPS);
-            rest = others;
-            words(planes)
-        };
-        self.valid.copy_from_slice(&word(8));
-        for (own, count) in self.counts.iter_mut().zip(word(4)) {
-            *own = count as u32;
+        let (planes, _rest) = bytes[HEADER_BYTES..].as_chunks::<RUN_STEPS>();
+        // Planes of each number one after the other.
+        let (valid, rest) = planes.split_at(8);
+        if wanted == Numbers::Valid {
+            self.valid.copy_from_slice(&words(valid));
+            return Ok(());
         }
-        for (own, weight) in self.weights.iter_mut().zip(word(8)) {
+        let (counts, rest) = rest.split_at(4);
+        self.counts.copy_from_slice(&halves(counts));
+        let (weights, mut rest) = rest.split_at(8);
+        for (own, weight) in self.weights.iter_mut().zip(words(weights)) {
             *own = weight.cast_signed();
         }
-        let squares = with_squares.then_some(&mut self.squares);
+        let squares = (wanted == Numbers::SumsAndSquares).then_some(&mut self.squares);
         for sums in [Some(&mut self.sums), squares].into_iter().flatten() {
-            let (low, high) = (word(8), word(8));
+            let (low, high) = (words(rest), words(&rest[8..]));
             for (own, (low, high)) in sums.iter_mut().zip(low.into_iter().zip(high)) {
                 *own = i128::from(high.cast_signed()) << 64 | i128::from(low);
             }
+            rest = &rest[16..];
         }
         Ok(())
     }
 }
 
-/// Side of the squares of bytes that are turned at a time.
-const SIDE: usize = size_of::<u64>();
+/// Numbers of a record that somebody needs: half of the time that a record takes goes into those of others.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Numbers {
+    /// Cells of the block itself that hold data.
+    Valid,
+    /// Counts, weights and sums.
+    Sums,
+    /// These, and squares.
+    SumsAndSquares,
+}
 
-/// Words of up to eight bytes, from planes of the lowest byte of all steps, the next one of all, and so on.
-fn words(planes: &[u8]) -> [u64; RUN_STEPS] {
-    let mut words = [0; RUN_STEPS];
-    for (at, words) in words.as_chunks_mut::<SIDE>().0.iter_mut().enumerate() {
-        let mut square = [0; SIDE];
-        for (row, plane) in square.iter_mut().zip(planes.as_chunks::<RUN_STEPS>().0) {
-            *row = u64::from_le_bytes(plane.as_chunks().0[at]);
+/// The same byte of the word of every step.
+type Plane = [u8; RUN_STEPS];
+
+/// Words of four bytes, of planes of the lowest byte first.
+///
+/// Bytes are paired, then pairs, in plain loops: compilers make them interleave sixteen and more of them at a time.
+fn halves(planes: &[Plane]) -> [u32; RUN_STEPS] {
+    let (mut low, mut high) = ([0u16; RUN_STEPS], [0u16; RUN_STEPS]);
+    for (pairs, planes) in [&mut low, &mut high]
+        .into_iter()
+        .zip(planes.chunks_exact(2))
+    {
+        for ((pair, low), high) in pairs.iter_mut().zip(&planes[0]).zip(&planes[1]) {
+            *pair = u16::from(*low) | u16::from(*high) << 8;
         }
-        *words = turned(square);
+    }
+    let mut words = [0; RUN_STEPS];
+    for ((word, low), high) in words.iter_mut().zip(&low).zip(&high) {
+        *word = u32::from(*low) | u32::from(*high) << 16;
     }
     words
 }
 
-/// A square of bytes with its rows as columns: halves are exchanged, then quarters, then single bytes.
-fn turned(mut rows: [u64; SIDE]) -> [u64; SIDE] {
-    for (distance, mask) in [
-        (4, 0x0000_0000_FFFF_FFFF),
-        (2, 0x0000_FFFF_0000_FFFF),
-        (1, 0x00FF_00FF_00FF_00FF),
-    ] {
-        for row in (0..SIDE).filter(|row| row & distance == 0) {
-            let other = row + distance;
-            let exchanged = ((rows[row] >> (8 * distance)) ^ rows[other]) & mask;
-            rows[other] ^= exchanged;
-            rows[row] ^= exchanged << (8 * distance);
-        }
+/// Words of eight bytes, of as many planes or more.
+fn words(planes: &[Plane]) -> [u64; RUN_STEPS] {
+    let (low, high) = (halves(planes), halves(&planes[4..]));
+    let mut words = [0; RUN_STEPS];
+    for ((word, low), high) in words.iter_mut().zip(&low).zip(&high) {
+        *word = u64::from(*low) | u64::from(*high) << 32;
     }
-    rows
+    words
 }
 
 #[cfg(test)]
 mod tests {
+    use std::array::from_fn;
+
     use super::*;
 
     #[test]
     fn words_are_made_of_the_bytes_of_their_planes() {
-        for count in [1, 4, 8] {
-            let planes: Vec<u8> = (0..count * RUN_STEPS)
-                .map(|at| (at * 7919 % 251) as u8)
-                .collect();
-            for (step, word) in words(&planes).into_iter().enumerate() {
-                let byte =
-                    |place: usize| u64::from(planes[place * RUN_STEPS + step]) << (8 * place);
-                assert_eq!(word, (0..count).map(byte).sum::<u64>(), "{count} {step}");
-            }
+        let byte = |place: usize, step: usize| ((place * RUN_STEPS + step) * 7919 % 251) as u8;
+        let planes: Vec<Plane> = (0..8)
+            .map(|place| from_fn(|step| byte(place, step)))
+            .collect();
+        for step in 0..RUN_STEPS {
+            let bytes: [u8; 8] = from_fn(|place| byte(place, step));
+            assert_eq!(words(&planes)[step], u64::from_le_bytes(bytes), "{step}");
+            let bytes: [u8; 4] = from_fn(|place| byte(place, step));
+            assert_eq!(halves(&planes)[step], u32::from_le_bytes(bytes), "{step}");
         }
     }
 
@@ -178,14 +192,21 @@ mod tests {
             own.is_summed = is_summed;
             own.write(&mut bytes);
             let mut back = Record::default();
-            back.read(&bytes, true).unwrap();
-            assert_eq!(back, own);
+            back.read(&bytes, Numbers::SumsAndSquares).unwrap();
+            let nothing = Record::default();
+            assert_eq!(back.valid, nothing.valid);
             let mut without = Record::default();
-            without.read(&bytes, false).unwrap();
-            assert_eq!((&without.sums, &without.valid), (&own.sums, &own.valid));
-            assert_eq!(without.squares, Record::default().squares);
+            without.read(&bytes, Numbers::Sums).unwrap();
+            assert_eq!((&without.sums, &without.valid), (&own.sums, &nothing.valid));
+            assert_eq!(without.squares, nothing.squares);
+            let mut cells = Record::default();
+            cells.read(&bytes, Numbers::Valid).unwrap();
+            assert_eq!((&cells.valid, &cells.sums), (&own.valid, &nothing.sums));
+            assert_eq!(cells.is_summed, is_summed);
+            back.read(&bytes, Numbers::Valid).unwrap();
+            assert_eq!(back, own);
         }
         bytes[0] = 2;
-        assert!(Record::default().read(&bytes, true).is_err());
+        assert!(Record::default().read(&bytes, Numbers::Sums).is_err());
     }
 }

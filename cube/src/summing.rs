@@ -97,6 +97,7 @@ mod tests {
     use contract::quantity::Quantity;
 
     use super::*;
+    use crate::record::Numbers;
 
     /// Two rows of three blocks.
     const COLS: usize = 24;
@@ -120,7 +121,8 @@ mod tests {
     fn read(records: &[u8], block: usize) -> Record {
         let mut own = Record::default();
         let bytes = &records[block * RECORD_BYTES..][..RECORD_BYTES];
-        own.read(bytes, true).unwrap();
+        own.read(bytes, Numbers::SumsAndSquares).unwrap();
+        own.read(bytes, Numbers::Valid).unwrap();
         own
     }
 

@@ -274,6 +274,15 @@ impl Analyses {
         self.text(key, computed).await
     }
 
+    /// An answer in a form.
+    pub(crate) fn written(
+        &self,
+        answer: &dyn Tabular,
+        form: RowsForm,
+    ) -> Result<Bytes, ServerError> {
+        written(&*self.analyst, answer, form)
+    }
+
     /// The cells where a mask has a code.
     pub async fn mask_region(
         &self,

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeSet;
 
-use cube::{BLOCK_CELLS, Piece as InRun, Record};
+use cube::{BLOCK_CELLS, Numbers, Piece as InRun, Record};
 
 use super::accumulator::StepSums;
 use super::cells::CellWeight;
@@ -91,6 +91,16 @@ impl<'a> Stored<'a> {
             with_squares,
             sums: vec![Signed::default(); count.unwrap_or(0)],
             unsummed: BTreeSet::new(),
+        }
+    }
+
+    /// What is needed of the record of a term.
+    pub(super) fn wanted(&self) -> impl Fn(usize) -> Numbers + use<'a> {
+        let (terms, with_squares) = (self.terms, self.with_squares);
+        move |term| match terms.0[term].of {
+            Use::Coast => Numbers::Valid,
+            Use::UpTo | Use::West if with_squares => Numbers::SumsAndSquares,
+            Use::UpTo | Use::West => Numbers::Sums,
         }
     }
 

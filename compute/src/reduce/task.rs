@@ -267,7 +267,7 @@ impl Worker {
             }
         );
         let mut stored = StoredSums::new(terms, records.pieces(), with_squares);
-        records.each(with_squares, |term, record| {
+        records.each(stored.wanted(), |term, record| {
             let weights = |number: u32| {
                 let window = block_window(shape, number);
                 block(self.cells().window(window), window)

@@ -4,11 +4,10 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use axum::Json;
 use axum::body::Body;
 use axum::extract::State;
-use axum::http::{HeaderMap, header};
-use axum::response::{IntoResponse as _, Response};
+use axum::http::HeaderMap;
+use axum::response::Response;
 use contract::budget::{
     AsOf, Besides, BudgetAnswer, BudgetHistory, BudgetQuery, BudgetWishes, BudgetWords, ErrorWords,
 };
@@ -16,10 +15,12 @@ use contract::earth::Earth;
 use contract::geometry_text;
 use contract::manifest::Manifest;
 use contract::region::{AskedRegion, Cells};
+use contract::rows::RowsForm;
 use contract::time::TimeStep;
 use serde::Deserialize;
 use utoipa::IntoParams;
 
+use super::statistics::{form, response};
 use crate::bodies::Room;
 use crate::catalogue::Layer;
 use crate::error::ServerError;
@@ -78,6 +79,9 @@ pub(crate) struct BudgetParameters {
     /// Parts of the region that are asked for by themselves too, and held against the whole: a GeoJSON `FeatureCollection` whose
     /// features have names, or a product that is a mask, of which each code is a part.
     regions: Option<String>,
+    /// Form of the answer: `json`, or its rows alone as `csv` or `arrow`, a file of Arrow; by the header `Accept` unless one is given.
+    #[param(value_type = Option<RowsForm>)]
+    format: Option<String>,
 }
 
 /// Where, and what is asked besides. The cells of a mask are still to be looked up.
@@ -200,15 +204,24 @@ fn seed(text: Option<&str>) -> Result<Option<u64>, ServerError> {
     operation_id = "budget",
     tag = "statistics",
     params(("product" = String, Path, description = "Name of a carbon flux or of accumulated carbon"), BudgetParameters),
-    responses((status = 200, description = "One row for each step of time", body = BudgetAnswer)),
+    responses((
+        status = 200,
+        description = "One row for each step of time",
+        content(
+            (BudgetAnswer = "application/json"),
+            (String = "text/csv"),
+            ("application/vnd.apache.arrow.file"),
+        ),
+    )),
 )]
 pub(crate) async fn get(
     State(state): State<AppState>,
+    headers: HeaderMap,
     UrlPath(product): UrlPath<String>,
     UrlQuery(asked): UrlQuery<BudgetParameters>,
 ) -> Result<Response, ServerError> {
     let read = asked.read()?;
-    answered(&state, &product, &asked, read).await
+    answered(&state, &headers, &product, &asked, read).await
 }
 
 /// The same of a region that is sent along, or in parts that are: the answer of GET with the text as `region`, or as `regions` if it
@@ -223,7 +236,15 @@ pub(crate) async fn get(
         description = "The region, or a `FeatureCollection` of parts with names, in place of the parameter of that name, as GeoJSON of at most 64 MiB and a million vertices",
         content((GeoJson = "application/geo+json"), (GeoJson = "application/json")),
     ),
-    responses((status = 200, description = "One row for each step of time", body = BudgetAnswer)),
+    responses((
+        status = 200,
+        description = "One row for each step of time",
+        content(
+            (BudgetAnswer = "application/json"),
+            (String = "text/csv"),
+            ("application/vnd.apache.arrow.file"),
+        ),
+    )),
 )]
 pub(crate) async fn post(
     State(state): State<AppState>,
@@ -233,15 +254,17 @@ pub(crate) async fn post(
     body: Body,
 ) -> Result<Response, ServerError> {
     let ((asked, read), _room) = asked.sent(&state, &headers, body).await?;
-    answered(&state, &product, &asked, read).await
+    answered(&state, &headers, &product, &asked, read).await
 }
 
 async fn answered(
     state: &AppState,
+    headers: &HeaderMap,
     product: &str,
     asked: &BudgetParameters,
     read: Read,
 ) -> Result<Response, ServerError> {
+    let form = form(asked.format.as_deref(), headers)?;
     let as_of: Option<AsOf> = parsed(asked.as_of.as_deref())?;
     let layer = match (&as_of, asked.manifest.as_deref()) {
         (Some(_), Some(_)) => {
@@ -256,7 +279,7 @@ async fn answered(
     // What cannot be asked waits for no turn.
     query.steps(&layer.manifest)?;
     let answer = state.analyses.budget(&layer, query).await?;
-    Ok(([(header::CACHE_CONTROL, "no-cache")], Json(&*answer)).into_response())
+    Ok(response(state.analyses.written(&*answer, form)?, form))
 }
 
 /// One budget by every version of the product that changed it: what was known when, and what changed it.
@@ -266,15 +289,24 @@ async fn answered(
     operation_id = "budget_history",
     tag = "statistics",
     params(("product" = String, Path, description = "Name of a carbon flux or of accumulated carbon"), BudgetParameters),
-    responses((status = 200, description = "A line for each version that changed it", body = BudgetHistory)),
+    responses((
+        status = 200,
+        description = "A line for each version that changed it",
+        content(
+            (BudgetHistory = "application/json"),
+            (String = "text/csv"),
+            ("application/vnd.apache.arrow.file"),
+        ),
+    )),
 )]
 pub(crate) async fn history(
     State(state): State<AppState>,
+    headers: HeaderMap,
     UrlPath(product): UrlPath<String>,
     UrlQuery(asked): UrlQuery<BudgetParameters>,
 ) -> Result<Response, ServerError> {
     let read = asked.read()?;
-    history_of(&state, &product, &asked, read).await
+    history_of(&state, &headers, &product, &asked, read).await
 }
 
 /// The same of a region that is sent along: the answer of GET with the text as `region`.
@@ -288,7 +320,15 @@ pub(crate) async fn history(
         description = "The region, or a `FeatureCollection` of parts with names, in place of the parameter of that name, as GeoJSON of at most 64 MiB and a million vertices",
         content((GeoJson = "application/geo+json"), (GeoJson = "application/json")),
     ),
-    responses((status = 200, description = "A line for each version that changed it", body = BudgetHistory)),
+    responses((
+        status = 200,
+        description = "A line for each version that changed it",
+        content(
+            (BudgetHistory = "application/json"),
+            (String = "text/csv"),
+            ("application/vnd.apache.arrow.file"),
+        ),
+    )),
 )]
 pub(crate) async fn post_history(
     State(state): State<AppState>,
@@ -298,15 +338,17 @@ pub(crate) async fn post_history(
     body: Body,
 ) -> Result<Response, ServerError> {
     let ((asked, read), _room) = asked.sent(&state, &headers, body).await?;
-    history_of(&state, &product, &asked, read).await
+    history_of(&state, &headers, &product, &asked, read).await
 }
 
 async fn history_of(
     state: &AppState,
+    headers: &HeaderMap,
     product: &str,
     asked: &BudgetParameters,
     read: Read,
 ) -> Result<Response, ServerError> {
+    let form = form(asked.format.as_deref(), headers)?;
     if asked.manifest.is_some() || asked.as_of.is_some() {
         return Err(ServerError::Address {
             reason: "a history is of all versions: leave manifest and as_of out".to_owned(),
@@ -315,7 +357,7 @@ async fn history_of(
     let layer = state.catalogue.version(product, None).await?;
     let (query, _room) = asked.query(state, &layer, read).await?;
     let answer = state.analyses.budget_history(&layer, query).await?;
-    Ok(([(header::CACHE_CONTROL, "no-cache")], Json(&*answer)).into_response())
+    Ok(response(state.analyses.written(&*answer, form)?, form))
 }
 
 /// The newest version of the product that says what is sea.

@@ -4,6 +4,7 @@ use axum::http::StatusCode;
 use contract::rows::RowsForm;
 
 use crate::app::TestApp;
+use crate::posted::post;
 
 const ARROW: &str = "application/vnd.apache.arrow.file";
 /// A question of each kind, and the columns of its rows.
@@ -55,6 +56,53 @@ async fn an_answer_has_the_form_that_is_asked_for() {
             .await;
         assert_eq!(any.body, plain.body);
     }
+}
+
+/// Budgets, and their histories, are kept by their rows, and written for whoever asks.
+#[tokio::test]
+async fn budgets_have_the_form_that_is_asked_for() {
+    let app = TestApp::new().await;
+    for (question, first, schema) in [
+        ("budget?step=month", "region,start,end,budget_tg,", "rows"),
+        (
+            "budget/history?step=total",
+            "manifest,published,changed,",
+            "versions",
+        ),
+    ] {
+        let path = format!("/api/products/flux/{question}");
+        let plain = app.get(&path).await;
+        let json = app.get(&format!("{path}&format=json")).await;
+        assert_eq!((json.status, &json.body), (StatusCode::OK, &plain.body));
+        assert_eq!(plain.header("content-type"), "application/json");
+        assert!(plain.header("vary").contains("accept"));
+        assert!(plain.json()[schema].is_array(), "{}", plain.text());
+        for (form, media) in [("csv", "text/csv"), ("arrow", ARROW)] {
+            let by_name = app.get(&format!("{path}&format={form}")).await;
+            let by_header = app.get_with(&path, &[("accept", media)]).await;
+            for answer in [by_name, by_header] {
+                assert_eq!(answer.header("content-type"), media, "{question}");
+                let right = format!("{form} of {first}");
+                assert!(answer.text().starts_with(&right), "{}", answer.text());
+            }
+        }
+        let refused = app.get(&format!("{path}&format=parquet")).await;
+        assert_eq!(refused.status, StatusCode::BAD_REQUEST);
+        assert!(refused.reason().contains("json, csv or arrow"));
+    }
+    assert_eq!(
+        app.analyst.budgets.lock().unwrap().len(),
+        2,
+        "asked once each"
+    );
+    let region = r#"{"type":"Polygon","coordinates":[[[0,0],[9,0],[9,9],[0,0]]]}"#;
+    let sent = app.send(post("flux/budget?format=csv", region)).await;
+    assert!(
+        sent.text()
+            .starts_with("csv of region,start,end,budget_tg,"),
+        "{}",
+        sent.text()
+    );
 }
 
 #[tokio::test]

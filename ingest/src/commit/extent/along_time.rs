@@ -10,7 +10,7 @@ use std::sync::Arc;
 
 use contract::key::ObjectKey;
 use contract::manifest::Manifest;
-use cube::{BLOCK_CELLS, CubeError, EncodedBlocks, EncodedSums, Piece, RUN_STEPS, Values};
+use cube::{BLOCK_CELLS, CubeError, EncodedBlocks, EncodedSums, Numbers, Piece, RUN_STEPS, Values};
 use storage::Store;
 use storage::domain::Cells;
 
@@ -132,11 +132,14 @@ impl Stored {
             let read = match &self {
                 Self::Sums(sums) => {
                     let steps = kept_in_run(sums.pieces(), &is_kept);
-                    sums.each(false, |at, record| {
-                        let of_step = |all, step: &usize| all | record.valid[*step];
-                        found.push((at, steps.iter().fold(0, of_step)));
-                        true
-                    })
+                    sums.each(
+                        |_| Numbers::Valid,
+                        |at, record| {
+                            let of_step = |all, step: &usize| all | record.valid[*step];
+                            found.push((at, steps.iter().fold(0, of_step)));
+                            true
+                        },
+                    )
                 }
                 Self::Values(blocks) => {
                     let steps = kept_in_run(blocks.pieces(), &is_kept);
