@@ -12,7 +12,7 @@ mod steps;
 
 use contract::digest::Digest;
 use contract::event::Body;
-use contract::manifest::Manifest;
+use contract::manifest::{Manifest, ManifestId};
 use contract::product::ProductId;
 use contract::quantity::Quantity;
 use contract::time::{Period, TimeMs};
@@ -27,6 +27,17 @@ use derivation::Derivation;
 use source::{SourceStep, steps_since};
 pub(crate) use statistic::{StatisticRequest, derive_statistics_if};
 pub use statistic::{derive_statistic, derive_statistics};
+
+/// The version of a flux that accumulated carbon was summed up from; none of all else, nor of statistics of accumulated carbon, some of
+/// which have its quantity.
+pub(crate) fn accumulated_from(manifest: &Manifest) -> Option<&ManifestId> {
+    let from = manifest.derived_from.as_ref()?;
+    let is_sum = from
+        .product
+        .accumulated()
+        .is_ok_and(|name| name == manifest.product);
+    (is_sum && manifest.quantity == Quantity::AccumulatedCarbon).then_some(from)
+}
 
 /// How far a derivation has come.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

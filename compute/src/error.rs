@@ -21,7 +21,7 @@ pub enum ComputeError {
         known: Vec<ProductId>,
     },
     /// A budget is asked of something that is no flux of carbon.
-    #[error("{product} holds {:?}, budgets need a carbon flux", .quantity)]
+    #[error("{product} is no flux of carbon, nor accumulated from one, but {}: only a carbon flux has a budget", .quantity.title())]
     NotAFlux {
         /// Product.
         product: ProductId,

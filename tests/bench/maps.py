@@ -123,6 +123,7 @@ class Own:
         tiles.say(f"  {seconds:.2f} s")
         for statistic in statistics:
             key = MONTHLY if (statistic, step) == ("anomaly", "month") else statistic
+            key = key if crop else on_all_cells([key])
             self.products.setdefault(key, f"{self.name}-{self.count}-{statistic}")
         return seconds
 
@@ -363,6 +364,8 @@ def compared(ours, theirs):
     if (own["time"].values.astype("datetime64[D]") != other["time"].values.astype("datetime64[D]")).any():
         sys.exit("anomaly: steps of other days")
     check("anomaly", own.values, other.values * stats.GRAMS_A_YEAR)
+    own = cells(on_all_cells(ANOMALY)).isel(time=steps)
+    check(on_all_cells(ANOMALY), own.values, other.values * stats.GRAMS_A_YEAR)
     own, other = cells(MONTHLY), theirs[MONTHLY]
     # A month is told by its middle here, by its first instant there.
     if (own["time"].values.astype("datetime64[M]") != other["time"].values.astype("datetime64[M]")).any():

@@ -62,19 +62,27 @@ fn what_goes_away_and_comes_back_costs_nothing_but_time() {
     );
 
     each_event_once(&outage.cluster, &outage.files);
-    let (cluster, observed) = (&outage.cluster, outage.observed);
-    let stored = |cluster: &Cluster| {
-        let text = cluster.succeed(&["observations", "query", "--dataset", "outage", "--json"])?;
-        Ok((text.lines().count() == observed).then_some(()))
-    };
-    cluster.wait_for("observations", LIMIT, stored).unwrap();
-    let product = cluster
+    let product = outage
+        .cluster
         .get(&format!("/tiles/{PRODUCT}/volume/0/0/0.png?time=2000-02"))
         .unwrap();
     assert_eq!(product.status, 200, "{}", product.text());
 }
 
 impl Outage<'_> {
+    /// Waits for all observations that were sent.
+    fn until_observed(&self) {
+        let observed = self.observed;
+        let stored = |cluster: &Cluster| {
+            let text =
+                cluster.succeed(&["observations", "query", "--dataset", "outage", "--json"])?;
+            Ok((text.lines().count() == observed).then_some(()))
+        };
+        self.cluster
+            .wait_for("observations", LIMIT, stored)
+            .unwrap();
+    }
+
     /// Three more granules and five more observations.
     fn more(&mut self) {
         let months = self.files.len()..self.files.len() + 3;
@@ -104,7 +112,7 @@ impl Outage<'_> {
         self.more();
         take_away(&self.cluster);
         if takes_work {
-            // What was sent before may have landed before: this cannot have.
+            // What was sent before may have landed before: of this neither granules without S3 can have, nor observations without PostGIS.
             self.more();
         }
         let mut most_bytes = 0;
@@ -133,8 +141,9 @@ impl Outage<'_> {
             self.more();
         }
         until_whole(&self.cluster, self.files.len());
+        self.until_observed();
         say(&format!(
-            "{part} away for {} s: all landed and derived {:.1} s after it was back, at most {} MiB in one process",
+            "{part} away for {} s: all landed, derived and stored {:.1} s after it was back, at most {} MiB in one process",
             self.seconds,
             back.elapsed().as_secs_f64(),
             most_bytes >> 20

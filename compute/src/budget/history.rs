@@ -12,6 +12,7 @@ use futures::future::BoxFuture;
 use storage::manifests;
 
 use super::query::budget_of;
+use crate::derive::accumulated_from;
 use crate::{ComputeError, Engine};
 
 /// Most versions that are looked at, the newest.
@@ -40,12 +41,12 @@ impl Reads {
         manifest: &Manifest,
     ) -> Result<Self, ComputeError> {
         let source;
-        let manifest = match &manifest.derived_from {
-            Some(id) if manifest.quantity == Quantity::AccumulatedCarbon => {
+        let manifest = match accumulated_from(manifest) {
+            Some(id) => {
                 source = manifests::load(engine.store(), id).await?;
                 &source
             }
-            _ => manifest,
+            None => manifest,
         };
         let is_inside = |period: Period| {
             query.from.is_none_or(|from| period.end > from)

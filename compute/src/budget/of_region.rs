@@ -13,6 +13,7 @@ use super::measure::Measure;
 use super::over_region::{AskedArea, over_region};
 use super::rows::{RegionAreas, rows};
 use super::uncertainty;
+use crate::derive::accumulated_from;
 use crate::{ComputeError, Engine};
 
 /// The budget of one region, without what is held against it.
@@ -25,7 +26,7 @@ pub(super) async fn of_region(
     if manifest.quantity != Quantity::AccumulatedCarbon {
         return of_flux(engine, query, manifest, (window, &steps)).await;
     }
-    let (Some(source), Some(extent)) = (&manifest.derived_from, manifest.extent()) else {
+    let (Some(source), Some(extent)) = (accumulated_from(manifest), manifest.extent()) else {
         return Err(ComputeError::NotAFlux {
             product: manifest.product.clone(),
             quantity: manifest.quantity,

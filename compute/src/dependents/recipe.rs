@@ -54,7 +54,9 @@ impl Recipe {
     pub(super) fn goes_with(&self, other: &Self) -> bool {
         match (self, other) {
             (Self::Statistic(one), Self::Statistic(other)) => {
-                one.sources().eq(other.sources()) && one.options.region == other.options.region
+                let (own, of_other) = (&one.options, &other.options);
+                one.sources().eq(other.sources())
+                    && (&own.region, own.crop) == (&of_other.region, of_other.crop)
             }
             _ => false,
         }
@@ -80,4 +82,30 @@ pub fn why_it_stays(manifest: &Manifest) -> Option<String> {
     Some(format!(
         "{product} stays as it is when {source} has a newer version: {why}; `fluxglobe derive statistic` makes it anew"
     ))
+}
+
+#[cfg(test)]
+mod tests {
+    use contract::analysis::{MapOptions, MapStatistic};
+
+    use super::*;
+
+    #[test]
+    fn what_lands_on_one_grid_is_read_together() {
+        let recipe = |statistic, region: &str, crop| {
+            Recipe::Statistic(Box::new(StatisticRequest {
+                target: "target".parse().unwrap(),
+                product: "sst".parse().unwrap(),
+                options: MapOptions {
+                    region: Some(region.parse().unwrap()),
+                    crop,
+                    ..MapOptions::new(statistic)
+                },
+            }))
+        };
+        let own = recipe(MapStatistic::Mean, "0,0,9,9", true);
+        assert!(own.goes_with(&recipe(MapStatistic::Max, "0,0,9,9", true)));
+        assert!(!own.goes_with(&recipe(MapStatistic::Max, "0,0,9,9", false)));
+        assert!(!own.goes_with(&recipe(MapStatistic::Max, "0,0,9,8", true)));
+    }
 }

@@ -1,10 +1,10 @@
 //! How complete the sums of one cell are, told from the series of the flux that they were accumulated from.
 
 use contract::manifest::Manifest;
-use contract::quantity::Quantity;
 use contract::series::CellCounts;
 use storage::manifests;
 
+use super::accumulated_from;
 use super::source::steps_since;
 use crate::stats::cell_values;
 use crate::{ComputeError, Engine};
@@ -19,13 +19,9 @@ pub(crate) async fn counts_at_cell(
     row: u32,
     col: u32,
 ) -> Result<Option<Vec<CellCounts>>, ComputeError> {
-    let (Some(id), Some(extent)) = (&manifest.derived_from, manifest.extent()) else {
+    let (Some(id), Some(extent)) = (accumulated_from(manifest), manifest.extent()) else {
         return Ok(None);
     };
-    // Statistics are derived too, and are no sums.
-    if manifest.quantity != Quantity::AccumulatedCarbon {
-        return Ok(None);
-    }
     let source = match manifests::load(engine.store(), id).await {
         Ok(source) => source,
         Err(e) if e.is_not_found() => return Ok(None),

@@ -65,7 +65,8 @@ pub fn derive_statistic<'a>(
 /// the same of how and of which versions it was made. [`super::derived`] is the event to tell of each, after its manifest.
 ///
 /// # Errors
-/// Steps that one cannot be made of, correlations with several products or one on another grid, a target that was not derived from the
+/// Steps that one cannot be made of, correlations with several products or one on another grid, several regions, some cropped and some
+/// not or a crop to no region, a target that was not derived from the
 /// same products, and what reading and writing meet; nothing is computed before all are looked at.
 pub fn derive_statistics<'a>(
     engine: &'a Engine,

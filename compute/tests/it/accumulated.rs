@@ -2,8 +2,9 @@
 
 use std::sync::Mutex;
 
-use compute::derive::{DeriveProgress, derived};
-use compute::{Engine, derive_accumulated};
+use compute::derive::{DeriveProgress, derive_statistic, derived};
+use compute::{Engine, budget, derive_accumulated, point_series};
+use contract::analysis::{MapOptions, MapStatistic};
 use contract::budget::BudgetQuery;
 use contract::earth::Earth;
 use contract::event::Body;
@@ -56,6 +57,45 @@ async fn what_is_derived_is_a_cube_too_and_one_that_is_behind_is_brought_up() {
         );
         let same = |(a, b): (&f32, &f32)| a.to_bits() == b.to_bits() || (a.is_nan() && b.is_nan());
         assert!(there.iter().zip(&here).all(same));
+    }
+}
+
+/// Some statistics of accumulated carbon have its quantity, and are no sums: nothing is said of how complete they are, and they have no
+/// budget.
+#[tokio::test(flavor = "multi_thread")]
+async fn statistics_of_accumulated_carbon_are_no_accumulated_carbon() {
+    let (_folder, store) = folder_store();
+    let (id, year) = (product("wavy"), wavy_year(&ONE_DEGREE));
+    land(&store, &id, Quantity::CarbonFlux, ONE_DEGREE, &year).await;
+    let engine = Engine::local(store.clone());
+    let sums = derive(&engine, "wavy", None).await;
+    let place = ONE_DEGREE.cell_center(80, 40);
+    let counted = point_series(&engine, &sums.product, place).await.unwrap();
+    assert!(counted.series.iter().all(|row| row.contributed.is_some()));
+    for (statistic, crop) in [
+        (MapStatistic::Max, false),
+        (MapStatistic::Climatology, true),
+    ] {
+        let options = MapOptions {
+            region: Some("-150,0,-120,30".parse().unwrap()),
+            crop,
+            name: Some(product("some")),
+            ..MapOptions::new(statistic)
+        };
+        let made = derive_statistic(&engine, &sums.product, &options, &|_| ()).await;
+        assert_eq!(made.unwrap().quantity, Quantity::AccumulatedCarbon);
+        let found = point_series(&engine, &product("some"), place)
+            .await
+            .unwrap();
+        assert!(
+            found
+                .series
+                .iter()
+                .all(|row| row.contributed.is_none() && row.value.is_some())
+        );
+        let query = total(&product("some"), "global");
+        let refused = budget(&engine, &query).await.unwrap_err().to_string();
+        assert!(refused.contains("only a carbon flux"), "{refused}");
     }
 }
 

@@ -100,7 +100,7 @@ async fn check_cube(store: &Store, manifest: &Manifest) {
     }
 }
 
-/// Around a region, and around one on both sides of the date line; made along time, held and not, and of whole fields.
+/// Around a region, around one on both sides of the date line, and at the edge of the grid; made along time, held and not, and of whole fields.
 #[tokio::test(flavor = "multi_thread")]
 async fn cropped_statistics_are_those_of_the_same_places() {
     let (_folder, store) = folder_store();
@@ -114,6 +114,8 @@ async fn cropped_statistics_are_those_of_the_same_places() {
     for (place, region, cells) in [
         ("inland", "12,-28,33,11", [16, 16]),
         ("across", "163,-19,-171,21", [16, 16]),
+        // To the last rows, which are half a block.
+        ("south", "-21,-90,33,-66", [12, 24]),
     ] {
         let whole = asked(region, false, &format!("{place}-whole"));
         let whole = derive_statistics(&roomy, &product("wind"), &whole, &|_| ()).await;

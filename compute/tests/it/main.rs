@@ -20,6 +20,7 @@ mod co2_flux;
 mod computed;
 #[cfg(test)]
 mod correlated;
+#[cfg(test)]
 mod cropped;
 #[cfg(test)]
 mod damaged;

@@ -167,30 +167,33 @@ async fn frozen_sums_are_those_of_their_values() {
     let blocks = [[0, 0], [0, 1], [1, 0], [1, 1]];
     let found = values.sums(&blocks, steps.clone()).await.unwrap().unwrap();
     let mut count = 0;
-    let sound = found.each(true, |number, record| {
-        let ([row, col], mut asked) = (blocks[number].map(|at| at * 8), 0);
-        for step in steps.clone() {
-            let (mut held, mut weight, mut sum, mut squares) = (0, 0, 0, 0);
-            for row in row..(row + 8).min(SUMMED[0]) {
-                for col in 0..(col + 8).min(SUMMED[1]) {
-                    let value = flux(step, (row * SUMMED[1] + col) as usize);
-                    if value.is_nan() {
-                        continue;
+    let sound = found.each(
+        |_| cube::Numbers::SumsAndSquares,
+        |number, record| {
+            let ([row, col], mut asked) = (blocks[number].map(|at| at * 8), 0);
+            for step in steps.clone() {
+                let (mut held, mut weight, mut sum, mut squares) = (0, 0, 0, 0);
+                for row in row..(row + 8).min(SUMMED[0]) {
+                    for col in 0..(col + 8).min(SUMMED[1]) {
+                        let value = flux(step, (row * SUMMED[1] + col) as usize);
+                        if value.is_nan() {
+                            continue;
+                        }
+                        let own = basis.row_weights[row as usize];
+                        held += 1;
+                        weight += own;
+                        sum += i128::from(own) * i128::from(basis.scale.steps(value));
+                        squares += i128::from(own) * i128::from(basis.scale.square_steps(value));
                     }
-                    let own = basis.row_weights[row as usize];
-                    held += 1;
-                    weight += own;
-                    sum += i128::from(own) * i128::from(basis.scale.steps(value));
-                    squares += i128::from(own) * i128::from(basis.scale.square_steps(value));
                 }
+                assert_eq!((record.counts[step], record.weights[step]), (held, weight));
+                assert_eq!((record.sums[step], record.squares[step]), (sum, squares));
+                asked += 1;
             }
-            assert_eq!((record.counts[step], record.weights[step]), (held, weight));
-            assert_eq!((record.sums[step], record.squares[step]), (sum, squares));
-            asked += 1;
-        }
-        count += 1;
-        asked == SUMMED_STEPS
-    });
+            count += 1;
+            asked == SUMMED_STEPS
+        },
+    );
     assert!(sound.is_ok());
     assert_eq!((count, found.pieces().len()), (4, 1));
 }

@@ -69,7 +69,8 @@ pub(crate) struct DeriveStatistic {
     #[arg(long, allow_hyphen_values = true)]
     pub(crate) region: Option<String>,
     /// Store only the cells about the region, out to whole blocks of 8 x 8: less to land and to keep of a small one. The product has a
-    /// grid of its own then, part of its source's. All cells of the source if absent, without data outside the region.
+    /// grid of its own then, part of its source's: what was computed of it on another grid follows it no more, so give it a --name of its own
+    /// where it was there with all cells. All cells of the source if absent, without data outside the region.
     #[arg(long, requires = "region")]
     pub(crate) crop: bool,
     /// Years of the climatology, both part of it: 1991/2020. All that the product covers if absent.

@@ -3183,6 +3183,8 @@ export interface operations {
                  *     features have names, or a product that is a mask, of which each code is a part.
                  */
                 regions?: string;
+                /** @description Form of the answer: `json`, or its rows alone as `csv` or `arrow`, a file of Arrow; by the header `Accept` unless one is given. */
+                format?: components["schemas"]["RowsForm"];
             };
             header?: never;
             path: {
@@ -3200,6 +3202,8 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["BudgetAnswer"];
+                    "text/csv": string;
+                    "application/vnd.apache.arrow.file": unknown;
                 };
             };
             /** @description A parameter is not valid, or missing; the reason says what would be */
@@ -3314,6 +3318,8 @@ export interface operations {
                  *     features have names, or a product that is a mask, of which each code is a part.
                  */
                 regions?: string;
+                /** @description Form of the answer: `json`, or its rows alone as `csv` or `arrow`, a file of Arrow; by the header `Accept` unless one is given. */
+                format?: components["schemas"]["RowsForm"];
             };
             header?: never;
             path: {
@@ -3337,6 +3343,8 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["BudgetAnswer"];
+                    "text/csv": string;
+                    "application/vnd.apache.arrow.file": unknown;
                 };
             };
             /** @description A parameter is not valid, or missing; the reason says what would be */
@@ -3478,6 +3486,8 @@ export interface operations {
                  *     features have names, or a product that is a mask, of which each code is a part.
                  */
                 regions?: string;
+                /** @description Form of the answer: `json`, or its rows alone as `csv` or `arrow`, a file of Arrow; by the header `Accept` unless one is given. */
+                format?: components["schemas"]["RowsForm"];
             };
             header?: never;
             path: {
@@ -3495,6 +3505,8 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["BudgetHistory"];
+                    "text/csv": string;
+                    "application/vnd.apache.arrow.file": unknown;
                 };
             };
             /** @description A parameter is not valid, or missing; the reason says what would be */
@@ -3609,6 +3621,8 @@ export interface operations {
                  *     features have names, or a product that is a mask, of which each code is a part.
                  */
                 regions?: string;
+                /** @description Form of the answer: `json`, or its rows alone as `csv` or `arrow`, a file of Arrow; by the header `Accept` unless one is given. */
+                format?: components["schemas"]["RowsForm"];
             };
             header?: never;
             path: {
@@ -3632,6 +3646,8 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["BudgetHistory"];
+                    "text/csv": string;
+                    "application/vnd.apache.arrow.file": unknown;
                 };
             };
             /** @description A parameter is not valid, or missing; the reason says what would be */
