@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::grid::Grid;
+use crate::grid::{Grid, rounded_deg, wrap_lon_deg};
 
 /// Chunk rows of a field. 1-degree grids make 3 x 3 chunks, the 1/60-degree China Sea 41 x 15.
 pub const CHUNK_ROWS: u32 = 60;
@@ -10,6 +10,9 @@ pub const CHUNK_ROWS: u32 = 60;
 pub const CHUNK_COLS: u32 = 120;
 /// Cells of a band of a large field, which is what is held of it: 32 MiB of values, a quarter-degree map 8 times.
 pub const BAND_CELLS: u64 = 1 << 23;
+
+/// Most noise that the arithmetic of an edge leaves, degrees.
+const EDGE_NOISE_DEG: f64 = 1e-12;
 
 /// A rectangle of cells of a grid, row 0 north.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -37,6 +40,34 @@ impl Window {
             let start = r as usize * grid_cols + self.col as usize;
             start..start + self.cols as usize
         })
+    }
+
+    /// The grid that its cells are by themselves. Of a grid that goes all the way round its columns may go on past the last one.
+    pub fn grid(self, whole: &Grid) -> Grid {
+        // Where steps are no binary fraction their sum has noise, which an edge of nine decimals has not.
+        let clean = |deg: f64| {
+            let rounded = rounded_deg(deg);
+            if (rounded - deg).abs() < EDGE_NOISE_DEG {
+                rounded
+            } else {
+                deg
+            }
+        };
+        Grid {
+            rows: self.rows,
+            cols: self.cols,
+            north_deg: if self.row == 0 {
+                whole.north_deg
+            } else {
+                clean(whole.row_north_deg(self.row))
+            },
+            west_deg: if self.col == 0 {
+                whole.west_deg
+            } else {
+                wrap_lon_deg(clean(whole.col_west_deg(self.col)))
+            },
+            ..*whole
+        }
     }
 }
 
@@ -101,6 +132,41 @@ mod tests {
         assert_eq!(of(&grid(1, 1), 1), [[0, 1]]);
         let large = of(&grid(18_000, 36_000), 1 << 23);
         assert_eq!((large.len(), large[1]), (100, [180, 360]));
+    }
+
+    #[test]
+    fn the_cells_of_a_window_by_themselves_are_those_of_the_whole() {
+        let globe = |cols: u32| Grid {
+            rows: cols / 2,
+            cols,
+            north_deg: 90.0,
+            west_deg: -180.0,
+            dlat_deg: 360.0 / f64::from(cols),
+            dlon_deg: 360.0 / f64::from(cols),
+        };
+        let window = |row, col, rows, cols| Window {
+            row,
+            col,
+            rows,
+            cols,
+        };
+        for whole in [globe(360), globe(3600)] {
+            let all = window(0, 0, whole.rows, whole.cols);
+            assert_eq!(all.grid(&whole), whole);
+            let own = window(24, whole.cols - 8, 16, 24).grid(&whole);
+            own.validate().unwrap();
+            for (row, col) in [(0, 0), (3, 7), (15, 8), (9, 23)] {
+                let (of_own, of_whole) = (
+                    own.cell_center(row, col),
+                    whole.cell_center(24 + row, (whole.cols - 8 + col) % whole.cols),
+                );
+                assert!((of_own.lat - of_whole.lat).abs() < 1e-11);
+                assert!((of_own.lon - of_whole.lon).abs() < 1e-11);
+            }
+        }
+        let own = window(502, 1203, 8, 8).grid(&globe(3600));
+        let edges = format!("{} {}", own.north_deg, own.west_deg);
+        assert_eq!(edges, "39.8 -59.7");
     }
 
     #[test]

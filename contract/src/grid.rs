@@ -3,7 +3,6 @@
 use serde::{Deserialize, Serialize};
 
 use crate::ContractError;
-use crate::chunk::Window;
 use crate::earth::Earth;
 
 /// Most cells a stored grid may have: 2^31, three times a global grid of 1/100 degree. A cell's number fits 32 bits, and a map of
@@ -92,8 +91,6 @@ pub struct Grid {
 
 /// Slack for edges computed from rounded coordinates, in cells.
 const EDGE_SLACK_CELLS: f64 = 1e-3;
-/// Most that the edge of a part of a grid has by its arithmetic, degrees.
-const PART_NOISE_DEG: f64 = 1e-12;
 
 impl Grid {
     /// Checks the invariants of a grid that came from outside.
@@ -186,36 +183,6 @@ impl Grid {
         )
     }
 
-    /// The grid of some of its rows and columns; columns go on past its last one where it goes all the way round.
-    #[must_use]
-    pub fn part(&self, part: Window) -> Self {
-        // Where steps are no binary fraction their sum has noise, which a bound of nine decimals has not.
-        let clean = |deg: f64| {
-            let rounded = rounded_deg(deg);
-            if (rounded - deg).abs() < PART_NOISE_DEG {
-                rounded
-            } else {
-                deg
-            }
-        };
-        let (north, west) = (self.row_north_deg(part.row), self.col_west_deg(part.col));
-        Self {
-            rows: part.rows,
-            cols: part.cols,
-            north_deg: if part.row == 0 {
-                self.north_deg
-            } else {
-                clean(north)
-            },
-            west_deg: if part.col == 0 {
-                self.west_deg
-            } else {
-                wrap_lon_deg(clean(west))
-            },
-            ..*self
-        }
-    }
-
     /// Bounds as west, south, east, north in degrees.
     pub fn bounds_deg(&self) -> [f64; 4] {
         [
@@ -291,38 +258,6 @@ mod tests {
             }),
             None
         );
-    }
-
-    #[test]
-    fn a_part_has_the_cells_of_the_whole() {
-        let tenths = Grid {
-            rows: 1800,
-            cols: 3600,
-            dlat_deg: 0.1,
-            dlon_deg: 0.1,
-            ..ONE_DEGREE
-        };
-        let part = |row, col, rows, cols| Window {
-            row,
-            col,
-            rows,
-            cols,
-        };
-        for grid in [ONE_DEGREE, tenths] {
-            assert_eq!(grid.part(part(0, 0, grid.rows, grid.cols)), grid);
-            let own = grid.part(part(24, grid.cols - 8, 16, 24));
-            own.validate().unwrap();
-            for (row, col) in [(0, 0), (3, 7), (15, 8), (9, 23)] {
-                let (of_part, of_whole) = (
-                    own.cell_center(row, col),
-                    grid.cell_center(24 + row, (grid.cols - 8 + col) % grid.cols),
-                );
-                assert!((of_part.lat - of_whole.lat).abs() < 1e-11);
-                assert!((of_part.lon - of_whole.lon).abs() < 1e-11);
-            }
-        }
-        let own = tenths.part(part(502, 1203, 8, 8));
-        assert_eq!(format!("{} {}", own.north_deg, own.west_deg), "39.8 -59.7");
     }
 
     #[test]

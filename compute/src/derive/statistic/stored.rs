@@ -49,7 +49,7 @@ impl Stored {
         Self {
             source: *source,
             part,
-            grid: source.part(part),
+            grid: part.grid(source),
         }
     }
 
