@@ -110,7 +110,7 @@ impl Record {
     }
 }
 
-/// Numbers of a record that somebody needs: half of the time that a record takes goes into those of others.
+/// Numbers of a record that somebody needs: sums need no cells, and a block on the coast is read for its cells alone.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Numbers {
     /// Cells of the block itself that hold data.

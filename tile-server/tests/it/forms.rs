@@ -1,4 +1,4 @@
-//! `format` and the header `Accept` of `/point`, `/line` and `/area`: the form of an answer, and what is remembered of it.
+//! `format` and the header `Accept` of `/point`, `/line`, `/area` and `/budget`: the form of an answer, and what is remembered of it.
 
 use axum::http::StatusCode;
 use contract::rows::RowsForm;
