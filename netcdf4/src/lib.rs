@@ -15,9 +15,12 @@ use text_type::null_terminated;
 /// # Errors
 /// It cannot be made there.
 pub fn create(path: &Path) -> hdf5::Result<File> {
-    // No object may carry the time of its making: the same values give the same bytes.
     File::with_options()
+        // No object may carry the time of its making: the same values give the same bytes.
         .with_fcpl(|create| create.obj_track_times(false))
+        // Nobody else knows of it yet. A program that is started meanwhile inherits the open file (HDF5 asks for no
+        // close-on-exec) and would hold its lock on, so that no other could open what is long written.
+        .with_fapl(|access| access.file_locking(false))
         .create(path)
 }
 
@@ -129,4 +132,28 @@ pub fn attach(file: &File, dataset: &Dataset, scales: &[&Dataset]) -> hdf5::Resu
         .shape([scales.len()])
         .create("DIMENSION_LIST")?
         .write_raw(&lists)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::process::Command;
+
+    #[test]
+    fn programs_that_are_started_meanwhile_keep_no_file_from_its_readers() {
+        let folder = std::env::temp_dir().join(format!("netcdf4-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let path = folder.join("file.nc");
+        let file = super::create(&path).unwrap();
+        // It inherits what is open now.
+        let mut other = Command::new("sleep").arg("60").spawn().unwrap();
+        super::scale(&file, "lat", &[1.0_f64, 2.0]).unwrap();
+        file.close().unwrap();
+        let read = hdf5::File::open(&path)
+            .and_then(|file| file.dataset("lat"))
+            .and_then(|lat| lat.read_raw::<f64>());
+        other.kill().unwrap();
+        other.wait().unwrap();
+        std::fs::remove_dir_all(&folder).unwrap();
+        assert_eq!(read.unwrap(), [1.0, 2.0]);
+    }
 }
