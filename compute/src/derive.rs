@@ -20,6 +20,7 @@ use futures::future::BoxFuture;
 use storage::{Store, manifests};
 
 use crate::publish::{IsStillAsked, MADE_AGAIN, check_asked, publish_if};
+use crate::summed::check_summed;
 use crate::workshop::Workshop;
 use crate::{ComputeError, Engine, catalogue};
 pub(crate) use at_cell::counts_at_cell;
@@ -157,6 +158,7 @@ async fn accumulated(
 async fn flux(store: &Store, product: &ProductId) -> Result<Manifest, ComputeError> {
     let source = catalogue::product(store, product).await?;
     if source.quantity == Quantity::CarbonFlux {
+        check_summed(store, &source).await?;
         Ok(source)
     } else {
         Err(ComputeError::NotAFlux {

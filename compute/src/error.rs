@@ -28,6 +28,18 @@ pub enum ComputeError {
         /// What it measures.
         quantity: Quantity,
     },
+    /// A budget is asked of an extreme of a flux.
+    #[error(
+        "{product} has no budget: it holds the {what} of each cell of {of}, which were there at different times, so that their sum never was; ask for the budget of {of}, or of its mean"
+    )]
+    NotSummed {
+        /// Product.
+        product: ProductId,
+        /// What it holds of each cell.
+        what: String,
+        /// What it was made of.
+        of: ProductId,
+    },
     /// The region and the product's grid have no area in common.
     #[error("the region does not touch the grid of {product}, which covers {bounds}")]
     RegionOutside {
@@ -188,6 +200,7 @@ impl ComputeError {
         match self {
             Self::UnknownProduct { .. } => ErrorClass::NotFound,
             Self::NotAFlux { .. }
+            | Self::NotSummed { .. }
             | Self::RegionOutside { .. }
             | Self::Region { .. }
             | Self::OceanShares { .. }

@@ -42,6 +42,7 @@ mod standalone;
 mod state;
 pub mod stats;
 mod step_range;
+mod summed;
 mod tail_store;
 mod workshop;
 
@@ -53,3 +54,4 @@ pub use error::{ComputeError, ErrorClass};
 pub use objects::Objects;
 pub use point::point_series;
 pub use session::Engine;
+pub use summed::has_budget;

@@ -1,6 +1,10 @@
 //! The versions that a derived one was made from, as its manifest says it.
 
 use contract::manifest::{Manifest, ManifestId};
+use contract::product::ProductId;
+use storage::{Store, manifests};
+
+use crate::ComputeError;
 
 /// The version that something was accumulated or a statistic made from, both of what is of two; none of anything else.
 pub(crate) fn made_from(manifest: &Manifest) -> Vec<&ManifestId> {
@@ -18,6 +22,31 @@ pub(crate) fn is_from_newer(latest: &Manifest, derived: &Manifest) -> bool {
     let is_of_same = is_of_same.eq(own.iter().map(|id| &id.product));
     let numbers = || theirs.iter().zip(&own).map(|(a, b)| (a.number, b.number));
     is_of_same && numbers().all(|(a, b)| a >= b) && numbers().any(|(a, b)| a > b)
+}
+
+/// Products whose newest versions are made of a product.
+///
+/// # Errors
+/// What reading them meets.
+pub(crate) async fn made_of(
+    store: &Store,
+    product: &ProductId,
+) -> Result<Vec<ProductId>, ComputeError> {
+    let mut found = vec![];
+    for other in manifests::products(store).await? {
+        let latest = manifests::latest(store, &other).await?;
+        let is_of_it = |latest: Manifest| match &latest.computed {
+            None => latest.derived_from.is_some_and(|of| of.product == *product),
+            Some(computed) => {
+                let mut inputs = computed.inputs.iter();
+                inputs.any(|input| input.manifest.product == *product)
+            }
+        };
+        if latest.is_some_and(is_of_it) {
+            found.push(other);
+        }
+    }
+    Ok(found)
 }
 
 #[cfg(test)]

@@ -7,6 +7,7 @@ pub(crate) mod address;
 mod area;
 mod box_cover;
 pub(crate) mod computed;
+mod crossings;
 mod cut;
 pub mod extent;
 pub mod file;

@@ -84,6 +84,14 @@ pub enum Computation {
 }
 
 impl Computation {
+    /// The statistic over time that it is of one input; none of anything else.
+    pub fn statistic(&self) -> Option<MapStatistic> {
+        match self {
+            Self::Statistic { statistic, .. } => Some(*statistic),
+            Self::Expression { .. } | Self::Regrid { .. } | Self::Correlation { .. } => None,
+        }
+    }
+
     /// Is a step of the result made of one step of each input, so that it is computed again when one changes?
     pub fn is_by_step(&self) -> bool {
         match self {

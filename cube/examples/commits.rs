@@ -56,6 +56,7 @@ async fn open(folder: &str) -> Result<Repository, Box<dyn Error>> {
         source: "made up".to_owned(),
         grid: GRID,
         version: None,
+        statistic: None,
     };
     Ok(Repository::create(&store, "p", &description).await?)
 }

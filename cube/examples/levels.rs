@@ -76,6 +76,7 @@ async fn measured(rows: u32, cols: u32, folder: &str) -> Result<(), Box<dyn std:
         source: "cube/examples/levels.rs".to_owned(),
         grid,
         version: None,
+        statistic: None,
     };
     let (store, traffic) = Store::open(folder)?.counted();
     let repository = Repository::create(&store, "p", &description).await?;

@@ -313,6 +313,7 @@ mod tests {
             source: "a test".to_owned(),
             grid: GRID,
             version: None,
+            statistic: None,
         };
         let created = Repository::create(&Store::memory(), "p", &description).await;
         let repository = created.unwrap();

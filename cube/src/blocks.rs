@@ -230,10 +230,14 @@ impl Blocks {
         let found = self.array.async_retrieve_chunk_if_exists(&index).await;
         match found {
             Ok(values) => Ok(values),
-            Err(error) => Err(self
-                .object(index)
-                .unreadable(index, &first_lines(&error))
-                .await),
+            Err(error) => {
+                let is_named = self.shards().is_named(index).await;
+                if is_named.is_ok_and(|is_named| !is_named) {
+                    return Ok(None);
+                }
+                let reason = first_lines(&error);
+                Err(self.object(index).unreadable(index, &reason).await)
+            }
         }
     }
 

@@ -1,7 +1,9 @@
 //! What the CF conventions call things: names and attributes of variables and coordinates.
 
+use contract::analysis::MapStatistic;
 use contract::earth::{WGS84_EQUATORIAL_RADIUS_M, WGS84_POLAR_RADIUS_M};
 use contract::quantity::{Flag, Quantity};
+use contract::statistics::Percentile;
 use serde_json::{Map, Value, json};
 
 use crate::Description;
@@ -78,8 +80,20 @@ fn standard_name(description: &Description) -> Option<&'static str> {
     }
 }
 
-/// What values are of their cells and steps; none of an open quantity, for it may be a mean, a code of a mask or an extreme.
-fn cell_methods(quantity: Quantity) -> Option<&'static str> {
+/// What values are of their cells and steps (CF 7.3); none of an open quantity, for it may be a mean, a code of a mask or an extreme. What
+/// the conventions have no word for is said of cells alone.
+fn cell_methods(quantity: Quantity, statistic: Option<MapStatistic>) -> Option<&'static str> {
+    match (quantity, statistic) {
+        (Quantity::Open(_), _) => return None,
+        (_, Some(MapStatistic::Mean)) => return Some("area: mean time: mean"),
+        (_, Some(MapStatistic::Min)) => return Some("area: mean time: minimum"),
+        (_, Some(MapStatistic::Max)) => return Some("area: mean time: maximum"),
+        (_, Some(MapStatistic::Percentile(Percentile::MEDIAN))) => {
+            return Some("area: mean time: median");
+        }
+        (_, Some(_)) => return Some("area: mean"),
+        (_, None) => {}
+    }
     match quantity {
         Quantity::AccumulatedCarbon => Some("area: mean time: sum"),
         // They hold at any time.
@@ -91,6 +105,28 @@ fn cell_methods(quantity: Quantity) -> Option<&'static str> {
     }
 }
 
+/// What values are of their cells and steps, by the conventions and, where these have no word for it, in words.
+pub(crate) fn method(description: &Description) -> (Option<&'static str>, Option<String>) {
+    let methods = cell_methods(description.quantity, description.statistic);
+    let said = methods.and(description.statistic);
+    (methods, said.and_then(over_time))
+}
+
+/// What a statistic is of the time that its bounds tell, where `cell_methods` has no word for it.
+fn over_time(statistic: MapStatistic) -> Option<String> {
+    match statistic {
+        MapStatistic::Percentile(Percentile::MEDIAN) => None,
+        MapStatistic::Percentile(_) => Some(format!(
+            "percentile {statistic} of each cell over the time of the bounds"
+        )),
+        MapStatistic::Climatology => Some(
+            "means over all years of the climatology, which the title tells, of the month or season that the bounds give in one of them"
+                .to_owned(),
+        ),
+        _ => None,
+    }
+}
+
 /// What is said of the values.
 pub fn of_values(description: &Description) -> Map<String, Value> {
     let quantity = description.quantity;
@@ -99,15 +135,20 @@ pub fn of_values(description: &Description) -> Map<String, Value> {
         "units": quantity.unit(),
         "grid_mapping": "crs",
     }));
-    if let Some(methods) = cell_methods(quantity) {
+    let mut comments = vec![];
+    let (methods, over_time) = method(description);
+    if let Some(methods) = methods {
         attributes.insert("cell_methods".to_owned(), methods.into());
+        comments.extend(over_time);
     }
     if let Some(name) = standard_name(description) {
         attributes.insert("standard_name".to_owned(), name.into());
     }
     if let Some([below, above]) = quantity.ends() {
-        let comment = format!("below zero the {below}, above it the {above}");
-        attributes.insert("comment".to_owned(), comment.into());
+        comments.push(format!("below zero the {below}, above it the {above}"));
+    }
+    if !comments.is_empty() {
+        attributes.insert("comment".to_owned(), comments.join("; ").into());
     }
     let flags = quantity.flags();
     if !flags.is_empty() {
@@ -250,11 +291,43 @@ mod tests {
         let open = Quantity::open("time", "1", "Time").unwrap();
         assert_eq!(variable(open), "time_values");
         // Nobody knows what those of others are.
-        assert_eq!(cell_methods(open), None);
-        assert_eq!(cell_methods(Quantity::Elevation), Some("area: mean"));
-        let with_time = Quantity::ALL.map(cell_methods);
+        assert_eq!(cell_methods(open, Some(MapStatistic::Max)), None);
+        let elevation = cell_methods(Quantity::Elevation, None);
+        assert_eq!(elevation, Some("area: mean"));
+        let with_time = Quantity::ALL.map(|quantity| cell_methods(quantity, None));
         let count = |words| with_time.iter().filter(|it| **it == Some(words)).count();
         assert_eq!(count("area: mean"), 3);
         assert_eq!(count("area: mean time: sum"), 1);
+    }
+
+    /// A map of highest values is none of means, whatever its quantity.
+    #[test]
+    fn statistics_over_time_are_named_as_the_conventions_have_it() {
+        let of = |statistic: &str| {
+            let statistic: MapStatistic = statistic.parse().unwrap();
+            let mut description = crate::description::tests::description();
+            description.statistic = Some(statistic);
+            let values = of_values(&description);
+            let text = |name: &str| values[name].as_str().unwrap().to_owned();
+            (text("cell_methods"), text("comment"))
+        };
+        for (statistic, methods) in [
+            ("mean", "area: mean time: mean"),
+            ("min", "area: mean time: minimum"),
+            ("max", "area: mean time: maximum"),
+            ("median", "area: mean time: median"),
+        ] {
+            let (found, comment) = of(statistic);
+            assert_eq!(found, methods);
+            assert!(comment.starts_with("below zero"), "{comment}");
+        }
+        for (statistic, says) in [("p97.5", "percentile p97.5"), ("climatology", "all years")] {
+            let (found, comment) = of(statistic);
+            assert_eq!(found, "area: mean");
+            assert!(
+                comment.contains(says) && comment.contains("below zero"),
+                "{comment}"
+            );
+        }
     }
 }

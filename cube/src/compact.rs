@@ -346,6 +346,7 @@ mod tests {
             source: "a test".to_owned(),
             grid: GRID,
             version: None,
+            statistic: None,
         };
         let made = Repository::create(&store, "p", &description).await;
         let repository = made.unwrap();

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use contract::analysis::MapStatistic;
 use contract::grid::Grid;
 use contract::manifest::{Manifest, ManifestId};
 use contract::product::ProductId;
@@ -37,6 +38,10 @@ pub struct Description {
     pub grid: Grid,
     /// The version that the cube is a copy of, if it is one.
     pub version: Option<ManifestId>,
+    /// What its values are over time of what it was made of; none of a product that is no statistic of another, and in cubes of before it was
+    /// kept.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub statistic: Option<MapStatistic>,
 }
 
 impl Description {
@@ -55,6 +60,7 @@ impl Description {
             source: manifest.source.clone(),
             grid: manifest.grid,
             version: Some(version),
+            statistic: manifest.computed.as_ref().and_then(|it| it.how.statistic()),
         }
     }
 
@@ -123,10 +129,10 @@ impl Description {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
 
-    fn description() -> Description {
+    pub(crate) fn description() -> Description {
         Description {
             product: "p".parse().unwrap(),
             title: "P".to_owned(),
@@ -142,6 +148,7 @@ mod tests {
                 dlon_deg: 1.0 / 60.0,
             },
             version: Some("p@3-0a1b2c3d".parse().unwrap()),
+            statistic: Some(MapStatistic::Max),
         }
     }
 

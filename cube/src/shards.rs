@@ -97,8 +97,19 @@ impl Shards<'_> {
         range: ByteRange,
     ) -> Result<Option<Vec<u8>>, String> {
         let key = self.array.chunk_key(&shard);
-        let found = self.array.storage().get_partial(&key, range).await;
-        let found = found.map_err(|e| first_lines(&e))?;
-        Ok(found.map(Vec::from))
+        match self.array.storage().get_partial(&key, range).await {
+            Ok(found) => Ok(found.map(Vec::from)),
+            // Of an array without any chunk the library says that one is gone.
+            Err(_) if !self.is_named(shard).await? => Ok(None),
+            Err(error) => Err(first_lines(&error)),
+        }
+    }
+
+    /// Does the repository name a shard? None without data is.
+    pub(crate) async fn is_named(&self, shard: [u64; 3]) -> Result<bool, String> {
+        let index = ChunkIndices(shard.iter().map(|at| *at as u32).collect());
+        let session = self.array.storage().session();
+        let payload = session.read().await.get_chunk_ref(self.path, &index).await;
+        Ok(payload.map_err(|e| first_lines(&e))?.is_some())
     }
 }

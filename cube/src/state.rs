@@ -11,7 +11,7 @@ use crate::arrays::SERIES;
 use crate::levels::Levels;
 use crate::series::Runs;
 use crate::sums::Sums;
-use crate::{CubeError, Description, Repository, Step, axis};
+use crate::{CubeError, Description, Repository, Step, axis, cf};
 
 /// What is there, and a session that changes it.
 pub(crate) struct State {
@@ -69,9 +69,13 @@ impl State {
         })
     }
 
-    /// Do its chunks hold the same cells of the same quantity?
+    /// Do its chunks hold the same cells of the same quantity, and does it say the same of what they are?
     pub(crate) fn describes_same_cells(&self, other: &Description) -> bool {
         let own = self.description.as_ref();
-        own.is_some_and(|own| own.grid == other.grid && own.quantity.is_same_kind(other.quantity))
+        own.is_some_and(|own| {
+            own.grid == other.grid
+                && own.quantity.is_same_kind(other.quantity)
+                && cf::method(own) == cf::method(other)
+        })
     }
 }

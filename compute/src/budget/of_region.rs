@@ -1,6 +1,6 @@
 //! The budget of one region: its weights, exact sums of every step, calendar rows with how uncertain they are.
 
-use contract::budget::{BudgetAnswer, BudgetQuery};
+use contract::budget::{BudgetAnswer, BudgetQuery, BudgetRow};
 use contract::manifest::{Manifest, Step};
 use contract::quantity::Quantity;
 use contract::time::{Period, TimeStep};
@@ -14,6 +14,7 @@ use super::over_region::{AskedArea, over_region};
 use super::rows::{RegionAreas, rows};
 use super::uncertainty;
 use crate::derive::accumulated_from;
+use crate::summed::check_summed;
 use crate::{ComputeError, Engine};
 
 /// The budget of one region, without what is held against it.
@@ -45,6 +46,7 @@ async fn of_flux(
     manifest: &Manifest,
     (window, steps): (Period, &[&Step]),
 ) -> Result<BudgetAnswer, ComputeError> {
+    check_summed(engine.store(), manifest).await?;
     let over = over_region(engine, manifest, steps, AskedArea::of(query), Measure::Mass).await?;
     let (sums, extent) = (over.sums, over.extent);
     let asked = RegionAreas {
@@ -60,6 +62,8 @@ async fn of_flux(
         .step
         .bins(window, steps.iter().map(|step| step.period))?;
     let mut rows = rows_of(&periods)?;
+    let mut notes = extent.notes;
+    notes.extend(without_rows(&periods, &rows));
     let closure = match query.step {
         TimeStep::Total => None,
         _ => Some(of_time(&rows, &rows_of(&[window])?).ok_or_else(too_large)?),
@@ -88,11 +92,24 @@ async fn of_flux(
         region_area_m2: extent.area_m2,
         ocean_area_m2: extent.ocean_m2,
         gap_basis: BASIS.to_owned(),
-        notes: extent.notes,
+        notes,
         uncertainty: basis,
         river: None,
         rows,
         regions: vec![],
         closure,
     })
+}
+
+/// What is to be said of periods that no step reaches into.
+fn without_rows(periods: &[Period], rows: &[BudgetRow]) -> Option<String> {
+    let mut with_rows = rows.iter().map(|row| row.start).peekable();
+    let is_without = |period: &&Period| with_rows.next_if_eq(&period.start).is_none();
+    let without: Vec<&Period> = periods.iter().filter(is_without).collect();
+    let first = without.first()?;
+    Some(format!(
+        "no step of the product reaches into {} of the {} periods, the first of them {first}: they have no row, and nothing of them is in a sum of rows",
+        without.len(),
+        periods.len()
+    ))
 }

@@ -6,6 +6,7 @@ use contract::quantity::{Quantity, SECONDS_PER_YEAR};
 use contract::time::Period;
 
 use super::of_region::of_region;
+use crate::summed::check_summed;
 use crate::{ComputeError, Engine};
 
 const MEANING: &str = "anthropogenic_tg is the budget less river_tg, the outgassing of carbon that rivers bring, positive out of the \
@@ -77,6 +78,7 @@ impl River {
                 quantity: manifest.quantity,
             });
         }
+        check_summed(engine.store(), manifest).await?;
         let (Some(first), Some(last)) = (rows.first(), rows.last()) else {
             return Err(ComputeError::inconsistent(
                 manifest.product.as_str(),

@@ -22,6 +22,8 @@ use std::sync::Arc;
 
 use contract::ContractError;
 use contract::analysis::{MapOptions, MapStatistic};
+use contract::computed::Computed;
+use contract::grid::Grid;
 use contract::manifest::{MANIFEST_SCHEMA, Manifest};
 use contract::product::ProductId;
 use contract::region::AskedRegion;
@@ -29,7 +31,7 @@ use futures::future::BoxFuture;
 use storage::manifests;
 
 use super::Progress;
-use crate::made_from::made_from;
+use crate::made_from::{made_from, made_of};
 use crate::publish::{IsStillAsked, MADE_AGAIN, check_asked, publish_if};
 use crate::{ComputeError, Engine};
 pub(crate) use kept::StatisticRequest;
@@ -207,6 +209,9 @@ impl<'a> Asked<'a> {
                 );
                 return Err(ContractError::invalid("product", target.as_str(), reason).into());
             }
+            if is_still_asked.is_none() {
+                check_grid(engine, &latest, &plan, stored).await?;
+            }
             if plan.has_values_of(&latest, stored) {
                 there = Some(if plan.is_said_by(&latest, sources.first) {
                     // Whoever published it may have been killed before the cube followed.
@@ -224,6 +229,39 @@ impl<'a> Asked<'a> {
             there,
         })
     }
+}
+
+/// # Errors
+/// Another crop is asked for than that of the version there is, and others are made of it: they would stay on the grid that it has.
+async fn check_grid(
+    engine: &Engine,
+    latest: &Manifest,
+    plan: &Plan,
+    stored: &Stored,
+) -> Result<(), ComputeError> {
+    let crop = |computed: Option<&Computed>| {
+        let map = computed.and_then(|own| own.map.as_ref());
+        map.filter(|map| map.crop).map(|map| map.region.clone())
+    };
+    if latest.grid == stored.grid || crop(latest.computed.as_ref()) == crop(Some(&plan.computed)) {
+        return Ok(());
+    }
+    let made_of_it = made_of(engine.store(), &latest.product).await?;
+    if made_of_it.is_empty() {
+        return Ok(());
+    }
+    let of = |grid: Grid| format!("{} x {} cells", grid.rows, grid.cols);
+    let names: Vec<&str> = made_of_it.iter().map(ProductId::as_str).collect();
+    let reason = format!(
+        "it is there on another grid ({}, it would be {}), and {} made of it on that: give another name",
+        of(latest.grid),
+        of(stored.grid),
+        match &names[..] {
+            [one] => format!("{one} is"),
+            all => format!("{} are", all.join(", ")),
+        }
+    );
+    Err(ContractError::invalid("product", latest.product.as_str(), reason).into())
 }
 
 /// A version with the same values, saying what they are made of now; its number is 0.

@@ -4,6 +4,7 @@ use contract::earth::Earth;
 use contract::region::{MAX_CORNERS, Polygon, Region};
 
 use super::area::signed_area_m2;
+use super::crossings;
 use super::cut::WORLD_DEG;
 use super::ring::{Checked, Ring};
 use super::union::united;
@@ -23,7 +24,8 @@ const MIN_AREA_M2: f64 = 1e-6;
 /// written with longitudes past 180 and another is not.
 ///
 /// # Errors
-/// No corner, corners that are no places, more than a million of them, a ring that is wider than the earth, or no area.
+/// No corner, corners that are no places, more than a million of them, edges that cross very often, a ring that is wider than the earth, or no
+/// area.
 pub(super) fn rings(region: &Region) -> Result<Vec<Ring>, ComputeError> {
     match region {
         Region::Global => {
@@ -37,7 +39,14 @@ pub(super) fn rings(region: &Region) -> Result<Vec<Ring>, ComputeError> {
             north,
         } => Ok(vec![Ring::rectangle([*west, *south, *east, *north])]),
         Region::Polygons(polygons) => {
-            let rings = united(&checked(polygons)?);
+            let polygons = checked(polygons)?;
+            if let Some(most) = crossings::too_many(&polygons) {
+                return Err(bad(format!(
+                    "its edges cross more than {most} times, and at most so many crossings are resolved; give polygons whose \
+                     edges do not cross, or fewer corners"
+                )));
+            }
+            let rings = united(&polygons);
             let area_m2: f64 = rings
                 .iter()
                 .map(|ring| signed_area_m2(ring, Earth::Sphere))

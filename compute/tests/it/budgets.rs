@@ -1,13 +1,18 @@
 //! Budgets with known answers, and questions that have none.
 
-use compute::{ComputeError, Engine, ErrorClass, budget};
+use compute::derive::derive_statistic;
+use compute::{ComputeError, Engine, ErrorClass, budget, derive_accumulated};
+use contract::analysis::{MapOptions, MapStatistic};
 use contract::budget::BudgetQuery;
 use contract::earth::Earth;
 use contract::grid::Grid;
 use contract::quantity::Quantity;
+use contract::statistics::Percentile;
 use contract::time::{Period, TimeStep};
 
-use crate::fixture::{ONE_DEGREE, ask, folder_store, land, months, parts, product, total};
+use crate::fixture::{
+    ONE_DEGREE, ask, folder_store, land, months, parts, product, total, wavy_year,
+};
 
 /// A flux that an f32 holds exactly: 2^-30 kg m⁻² s⁻¹.
 const FLUX: f32 = 1.0 / (1u32 << 30) as f32;
@@ -242,4 +247,42 @@ async fn periods_without_a_step_are_refused_with_what_there_is() {
     }
     let backwards = refusal(&engine, between("2001", "2000")).await;
     assert_eq!(backwards.class(), ErrorClass::BadRequest);
+}
+
+/// Cells that each have their value from another time have no sum.
+#[tokio::test(flavor = "multi_thread")]
+async fn extremes_of_a_flux_have_no_budget() {
+    let (_folder, store) = folder_store();
+    let (id, year) = (product("wavy"), wavy_year(&ONE_DEGREE));
+    land(&store, &id, Quantity::CarbonFlux, ONE_DEGREE, &year).await;
+    let engine = Engine::local(store.clone());
+    let made = async |statistic: MapStatistic| {
+        let options = MapOptions::new(statistic);
+        let made = derive_statistic(&engine, &id, &options, &|_| ()).await;
+        made.unwrap().product
+    };
+    let whole = budget(&engine, &total(&id, "global")).await.unwrap();
+    let mean = made(MapStatistic::Mean).await;
+    let mean = budget(&engine, &total(&mean, "global")).await.unwrap();
+    let [whole, mean] = [&whole, &mean].map(|answer| kg(&answer.rows[0].budget_kg));
+    assert!((whole - mean).abs() < 1e-4 * whole.abs(), "{whole} {mean}");
+    for (statistic, what) in [
+        (MapStatistic::Max, "highest values"),
+        (MapStatistic::Min, "lowest values"),
+        (MapStatistic::Percentile(Percentile::MEDIAN), "medians"),
+        (
+            MapStatistic::Percentile("95".parse().unwrap()),
+            "percentiles (p95)",
+        ),
+    ] {
+        let product = made(statistic).await;
+        let refused = budget(&engine, &total(&product, "global"))
+            .await
+            .unwrap_err();
+        let refused = refused.to_string();
+        let told = format!("holds the {what} of each cell of wavy");
+        assert!(refused.contains(&told), "{refused}");
+        let refused = derive_accumulated(&engine, &product, None, &|_| ()).await;
+        assert!(refused.unwrap_err().to_string().contains(&told));
+    }
 }

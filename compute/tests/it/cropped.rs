@@ -177,3 +177,33 @@ async fn what_is_cropped_can_be_had_whole_again() {
         check_cube(&store, &made).await;
     }
 }
+
+/// What others are made of stays on the grid that they are on, unless nobody asked for it otherwise.
+#[tokio::test(flavor = "multi_thread")]
+async fn what_others_are_made_of_keeps_its_grid() {
+    let (_folder, store) = folder_store();
+    landed(&store).await;
+    let engine = Engine::in_process(store.clone(), parts(2));
+    let derived = async |region: &str, crop: bool| {
+        let options = &asked(region, crop, "here")[2];
+        derive_statistic(&engine, &product("wind"), options, &|_| ()).await
+    };
+    let whole = derived("12,-28,33,11", false).await.unwrap();
+    let spread = MapOptions {
+        name: Some(product("spread-here")),
+        ..MapOptions::new(MapStatistic::Spread)
+    };
+    let spread = derive_statistic(&engine, &whole.product, &spread, &|_| ()).await;
+    spread.unwrap();
+    let refused = derived("12,-28,33,11", true).await.unwrap_err().to_string();
+    for part in [
+        "36 x 72 cells",
+        "16 x 16",
+        "spread-here is made of it",
+        "give another name",
+    ] {
+        assert!(refused.contains(part), "{refused}");
+    }
+    // Another region on the same grid is another version of it.
+    assert_eq!(derived("-60,-28,33,11", false).await.unwrap().number, 2);
+}

@@ -47,6 +47,7 @@ impl Other {
             source: "a test".to_owned(),
             grid: GRID,
             version: None,
+            statistic: None,
         };
         let repository = Repository::create(&store, "p", &description).await;
         let own = Self {

@@ -78,6 +78,7 @@ async fn levels_of_another_layout_are_not_read_and_made_anew() {
         source: "a test".to_owned(),
         grid: GRID,
         version: None,
+        statistic: None,
     };
     let repository = Repository::create(&store, "p", &description).await.unwrap();
     put(&repository, 1).await;

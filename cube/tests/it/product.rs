@@ -29,6 +29,7 @@ pub(crate) fn description(quantity: Quantity, grid: Grid) -> Description {
         source: "a test".to_owned(),
         grid,
         version: None,
+        statistic: None,
     }
 }
 

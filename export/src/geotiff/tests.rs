@@ -24,6 +24,7 @@ fn description() -> Description {
         source: "Somebody et al. (2000)".to_owned(),
         grid: GRID,
         version: None,
+        statistic: None,
     }
 }
 

@@ -33,6 +33,7 @@ fn description(quantity: Quantity) -> Description {
         source: "Somebody et al. (2000)".to_owned(),
         grid: GRID,
         version: "some-product@3-0a1b2c3d".parse().ok(),
+        statistic: None,
     }
 }
 

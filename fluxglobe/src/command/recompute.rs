@@ -11,7 +11,6 @@ use comfy_table::presets::NOTHING;
 use compute::recompute::{Plan, Reason, Request, What};
 use contract::event::Event;
 use contract::product::ProductId;
-use contract::quantity::Quantity;
 use serde::Serialize;
 use storage::Store;
 
@@ -94,17 +93,23 @@ async fn cubes(store: &Store, product: &ProductId) -> Result<()> {
     Ok(())
 }
 
-/// What is to be computed. Only carbon fluxes accumulate; fields of other quantities are those of their files alone.
+/// What is to be computed. Only carbon fluxes accumulate and have budgets, and no extremes of them: fields of all else are those of their files
+/// alone, and a budget is refused where nothing else is asked for.
 async fn plan(settings: &Settings, store: &Store, options: &Recompute) -> Result<Plan> {
     let manifest = deployment::manifest(store, &options.product, &settings.data).await?;
-    let is_flux = manifest.quantity == Quantity::CarbonFlux;
+    let is_flux = compute::has_budget(store, &manifest).await?;
+    let is_asked_alone = options.what.len() == 1;
     let computed = options.what.iter().filter_map(|what| what.computed());
     let request = Request {
         product: options.product.clone(),
         from: options.from,
         to: options.to,
         what: computed
-            .filter(|what| is_flux || *what != What::Fields)
+            .filter(|what| match what {
+                What::Fields => is_flux,
+                What::Budget => is_flux || is_asked_alone,
+                What::Statistics => true,
+            })
             .collect(),
         is_forced: options.force,
         is_verified: options.verify,

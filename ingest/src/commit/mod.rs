@@ -4,6 +4,7 @@
 //! newest is read again. Everything it names is durable before. A crash before the publication leaves objects that
 //! nothing names; the same files make the same objects again and land once. The product's cube follows the manifest.
 
+mod claim;
 mod extent;
 pub(crate) mod landing_note;
 mod mend;
@@ -23,6 +24,7 @@ use crate::put::StoredGranule;
 use extent::Valued;
 use merge::{Change, Merged};
 
+pub(crate) use claim::Claim;
 pub(crate) use extent::FIELDS_AT_ONCE;
 pub(crate) use extent::write as domain;
 pub(crate) use mend::mend;
@@ -37,23 +39,28 @@ const LOST_RACES: usize = 200;
 const ATTEMPTS: Backoff = Backoff::contended(LOST_RACES);
 
 /// Publishes files of one product, in their order. Files for the same period become manifests one after the other, so
-/// that each revision can be cited.
+/// that each revision can be cited. What `claims` are of was offered again and is there: files that were offered before that take no place of it.
 pub(crate) async fn run(
     store: &Store,
     granules: &[StoredGranule],
+    claims: &[Claim],
 ) -> Result<Vec<Answer>, IngestError> {
     let mut all = Vec::with_capacity(granules.len());
     let mut rest = granules;
     while !rest.is_empty() {
         let (group, later) = rest.split_at(merge::disjoint_prefix(rest));
-        all.extend(publish(store, group).await?);
+        all.extend(publish(store, group, claims).await?);
         rest = later;
     }
     Ok(all)
 }
 
 /// Publishes one file or several; none has the time of another one.
-async fn publish(store: &Store, granules: &[StoredGranule]) -> Result<Vec<Answer>, IngestError> {
+async fn publish(
+    store: &Store,
+    granules: &[StoredGranule],
+    claims: &[Claim],
+) -> Result<Vec<Answer>, IngestError> {
     let product = &granules[0].product;
     let mut noted = vec![None; granules.len()];
     let mut pauses = ATTEMPTS.pauses();
@@ -61,7 +68,7 @@ async fn publish(store: &Store, granules: &[StoredGranule]) -> Result<Vec<Answer
         let newest = manifests::latest(store, product)
             .await
             .map_err(IngestError::storage("read the newest manifest"))?;
-        let merged = merge::merge(newest.as_ref(), granules);
+        let merged = merge::merge(newest.as_ref(), granules, claims);
         let version = if merged.is_changed() {
             note(store, granules, &merged, &mut noted).await?;
             let manifest = build(store, newest.as_ref(), &merged, granules).await?;

@@ -63,6 +63,11 @@ impl<T> PublishQueue<T> {
         files.any(|file| matches!(file.state, State::Preparing))
     }
 
+    /// Is a product being published?
+    pub(super) fn is_busy(&self, product: &ProductId) -> bool {
+        self.busy.contains(product)
+    }
+
     /// A product is no longer being published.
     pub(super) fn free(&mut self, product: &ProductId) {
         self.busy.remove(product);

@@ -7,6 +7,7 @@ use std::future::Future;
 use std::sync::Arc;
 use std::time::Duration;
 
+use contract::product::ProductId;
 use contract::topic::Origin;
 use futures::FutureExt as _;
 use futures::future::{AbortHandle, Abortable, Shared};
@@ -19,6 +20,7 @@ use super::publish_queue::{Number, PublishQueue};
 use super::retry::Caller;
 use super::work::{self, Done, Ended, Work, alongside};
 use super::{GROUP, IngestService, TOPIC, now};
+use crate::commit::Claim;
 use crate::error::IngestError;
 use crate::notice::{Answer, Outcome, PendingNotice};
 use crate::pipeline::metrics::{Metrics, class};
@@ -67,6 +69,12 @@ struct Shift<'a> {
     next: Number,
     work: Work<'a>,
     ended: Vec<Ended>,
+    /// Files that are there, whose notices files before them must not pass by.
+    claims: Vec<(Number, Claim)>,
+    /// The newest version of each product that was published here.
+    published: BTreeMap<ProductId, u64>,
+    /// Files to be read again once their product is not being published: they were there before.
+    again: Vec<(Number, ProductId)>,
     /// Messages of which everything is answered.
     finished: BTreeMap<Number, Open>,
     /// What became of the files of a command, in the order of their notices.
@@ -97,6 +105,9 @@ pub(super) async fn run(
         next: 0,
         work: Work::new(),
         ended: Vec::new(),
+        claims: Vec::new(),
+        published: BTreeMap::new(),
+        again: Vec::new(),
         finished: BTreeMap::new(),
         told,
     };
@@ -104,6 +115,7 @@ pub(super) async fn run(
     loop {
         shift.settle()?;
         shift.give_up(&reader.lost());
+        shift.read_again();
         shift.publish();
         shift.finish(reader.as_mut()).await?;
         if last_call.is_none() && stop.clone().now_or_never().is_some() {
@@ -181,14 +193,7 @@ impl Shift<'_> {
             answers.push((job, None));
             self.publish_queue.add(job, notice.order_key());
             let notice = Arc::new(notice);
-            let span =
-                tracing::info_span!("notice", trace = notice.cause.trace, origin = %message.origin);
-            let by = (self.caller, &self.service.health);
-            let work = work::prepare(self.pipeline, by, job, Arc::clone(&notice));
-            let (prepare, registration) = AbortHandle::new_pair();
-            let work = Abortable::new(work.instrument(span), registration);
-            let work = work.map(|ended| ended.unwrap_or(Ok(Done::GivenUp)));
-            self.work.push(Box::pin(work));
+            let prepare = self.prepare(job, &notice);
             let message = number;
             self.jobs.insert(
                 job,
@@ -206,6 +211,58 @@ impl Shift<'_> {
             running: self.service.metrics.start("notice"),
         };
         self.open.insert(number, open);
+    }
+
+    /// Begins to take a file as far as to the manifest.
+    fn prepare(&mut self, job: Number, notice: &Arc<PendingNotice>) -> AbortHandle {
+        let origin = notice.origin;
+        let span = tracing::info_span!("notice", trace = notice.cause.trace, %origin);
+        let by = (self.caller, &self.service.health);
+        let work = work::prepare(self.pipeline, by, job, Arc::clone(notice));
+        let (prepare, registration) = AbortHandle::new_pair();
+        let work = Abortable::new(work.instrument(span), registration);
+        let work = work.map(|ended| ended.unwrap_or(Ok(Done::GivenUp)));
+        self.work.push(Box::pin(work));
+        prepare
+    }
+
+    /// Reads files again that were there in a version that others were published over meanwhile.
+    fn read_again(&mut self) {
+        let queue = &self.publish_queue;
+        let free = self
+            .again
+            .extract_if(.., |(_, product)| !queue.is_busy(product));
+        for (number, _) in free.collect::<Vec<_>>() {
+            let Some(notice) = self.jobs.get(&number).map(|job| Arc::clone(&job.notice)) else {
+                continue;
+            };
+            let prepare = self.prepare(number, &notice);
+            if let Some(job) = self.jobs.get_mut(&number) {
+                job.prepare = prepare;
+            }
+        }
+    }
+
+    /// All of a file is in a version of its product.
+    fn there(&mut self, number: Number, claim: Claim, answer: Answer) {
+        let published = self.published.get(&claim.product);
+        if self.publish_queue.is_busy(&claim.product)
+            || published.is_some_and(|newest| *newest > claim.version)
+        {
+            self.again.push((number, claim.product));
+            return;
+        }
+        self.claims.push((number, claim));
+        self.answered(number, answer);
+    }
+
+    /// What files claim that are there, as long as others that came before them are on their way.
+    fn claims_of(&self, product: &ProductId) -> Vec<Claim> {
+        let of_it = self
+            .claims
+            .iter()
+            .filter(|(_, claim)| claim.product == *product);
+        of_it.map(|(_, claim)| claim.clone()).collect()
     }
 
     /// Ends what is under way for messages that another member has now: it does all of it again. What is being published
@@ -262,11 +319,16 @@ impl Shift<'_> {
                         self.publish_queue.ready(number, product, granule);
                     }
                     Prepared::Answered(answer) => self.answered(number, answer),
+                    Prepared::There(claim, answer) => self.there(number, claim, answer),
                 },
                 Done::GivenUp => {}
                 Done::Published(product, answers) => {
                     self.publish_queue.free(&product);
                     for (number, answer) in answers {
+                        if let Outcome::Landed { manifest, .. } = &answer.outcome {
+                            let newest = self.published.entry(product.clone()).or_default();
+                            *newest = manifest.number.max(*newest);
+                        }
                         self.answered(number, answer);
                     }
                 }
@@ -280,6 +342,9 @@ impl Shift<'_> {
         let Some(job) = self.jobs.remove(&number) else {
             return;
         };
+        let first = self.jobs.keys().next().copied();
+        self.claims
+            .retain(|(claimed, _)| first.is_some_and(|first| first < *claimed));
         let Some(open) = self.open.get_mut(&job.message) else {
             return;
         };
@@ -300,7 +365,8 @@ impl Shift<'_> {
         }
         for (product, files) in self.publish_queue.take() {
             let by = (self.caller, &self.service.health);
-            let work = work::publish(self.pipeline, by, product, files);
+            let claims = self.claims_of(&product);
+            let work = work::publish(self.pipeline, by, (product, claims), files);
             self.work.push(Box::pin(work));
         }
     }

@@ -10,6 +10,7 @@ use futures::stream::{FuturesUnordered, StreamExt as _};
 use super::health::Health;
 use super::publish_queue::Number;
 use super::retry::{Caller, retry};
+use crate::commit::Claim;
 use crate::error::IngestError;
 use crate::notice::{Answer, PendingNotice};
 use crate::pipeline::{Pipeline, Prepared};
@@ -63,18 +64,18 @@ pub(super) async fn prepare(
 pub(super) async fn publish(
     pipeline: Pipeline<'_>,
     by: (Caller, &Health),
-    product: ProductId,
+    (product, claims): (ProductId, Vec<Claim>),
     files: Vec<(Number, StoredGranule)>,
 ) -> Ended {
     let (numbers, granules): (Vec<Number>, Vec<StoredGranule>) = files.into_iter().unzip();
-    let together = retry(by, "publish", || pipeline.commit(&granules)).await;
+    let together = retry(by, "publish", || pipeline.commit(&granules, &claims)).await;
     let answers = match together {
         Ok(answers) => answers,
         Err(error) if granules.len() > 1 && by.0.refuses(&error) => {
             tracing::error!(%error, "files of a product cannot be published together; one by one");
             let mut answers = Vec::with_capacity(granules.len());
             for own in granules.chunks(1) {
-                match retry(by, "publish", || pipeline.commit(own)).await {
+                match retry(by, "publish", || pipeline.commit(own, &claims)).await {
                     Ok(alone) => answers.extend(alone),
                     Err(error) => answers.push(by.0.refused(&own[0].notice, error)?),
                 }

@@ -16,7 +16,7 @@ use contract::quantity::Quantity;
 use contract::time::Period;
 use storage::{StorageError, Store, manifests};
 
-use crate::commit::{self, Unchanged, is_later_or_same};
+use crate::commit::{self, Claim, Unchanged, is_later_or_same};
 use crate::error::{IngestError, Rejection, Stop, blame, boundary};
 use crate::fetch::{self, RawGranule};
 use crate::inspect;
@@ -41,8 +41,10 @@ const TEXT_HEAD_BYTES: usize = 256 << 10;
 pub(crate) enum Prepared {
     /// To publish, with others of its product.
     ToCommit(StoredGranule),
-    /// Nothing is to be published: it is refused, was there, came too late, or held observations, which are stored.
+    /// Nothing is to be published: it is refused, came too late, or held observations, which are stored.
     Answered(Answer),
+    /// All of it is there. Files that were offered before it may still be on their way.
+    There(Claim, Answer),
 }
 
 /// What every file's way needs.
@@ -171,8 +173,15 @@ impl Pipeline<'_> {
         if let Some(unchanged) = unchanged {
             // What is stored of it is compared, and replaced if it is damaged.
             raw.await?;
+            let claim = Claim::of(&unchanged.0, way.notice.place);
+            let is_there = matches!(unchanged.1, Unchanged::Same(_));
             let answer = commit::answer_unchanged(self.store, way.notice, unchanged, None);
-            return Ok(Prepared::Answered(answer.await?));
+            let answer = answer.await?;
+            return Ok(if is_there {
+                Prepared::There(claim, answer)
+            } else {
+                Prepared::Answered(answer)
+            });
         }
         let _pass = seat
             .with_memory(memory::of_grids(&planned, &self.settings.limits))
@@ -222,10 +231,11 @@ impl Pipeline<'_> {
         Err(Rejection::new(RejectReason::Conflict, "product", detail).into())
     }
 
-    /// Publishes files of one product, in their order.
+    /// Publishes files of one product, in their order, beside what files that were offered later claim.
     pub(crate) async fn commit(
         &self,
         granules: &[StoredGranule],
+        claims: &[Claim],
     ) -> Result<Vec<Answer>, IngestError> {
         let running = self.metrics.start("commit");
         let needed = granules
@@ -237,7 +247,7 @@ impl Pipeline<'_> {
                 let shown = granule.notice.path();
                 self.progress.stage(&shown, Stage::Commit, 0, 0);
             }
-            commit::run(self.store, granules).await
+            commit::run(self.store, granules, claims).await
         };
         let committed = boundary::contained(work).await.flatten();
         running.done(match &committed {

@@ -6,7 +6,9 @@ mod bounds;
 pub(crate) mod cf;
 mod coverage;
 mod date;
+mod edges;
 mod flags;
+mod method;
 mod place;
 pub(crate) mod profile;
 mod quality;
@@ -149,6 +151,10 @@ pub(crate) async fn plan(
         holds_always: false,
     };
     let (axes, mapping) = place::mapping(&mut planning, variable).await?;
+    if profile.is_none() && wish.meaning.is_none() {
+        let time = planning.time_variable(&axes);
+        method::check(variable, meaning.quantity, time.as_deref())?;
+    }
     let periods = steps::periods(&mut planning, (variable, meaning.quantity), &axes).await?;
     if matches!(meaning.quantity, Quantity::Open(_)) && open::stated_unit(variable).is_none() {
         planning.assume(format!(

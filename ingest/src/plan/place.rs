@@ -3,6 +3,7 @@
 use contract::event::RejectReason;
 
 use super::Planning;
+use super::edges::{self, Along};
 use crate::error::{Rejection, Stop};
 use crate::inspect::file::description::{Dimension, Variable};
 use crate::plan::cf::axis::{Mapping, Registration};
@@ -219,6 +220,14 @@ async fn read_mapping(
             check_evidence(planning, name, labels, most_deg)?;
         }
     }
+    let (lat_deg, lon_deg) = if planning.profile.is_none() {
+        (
+            edges::middles(planning, (&names[0], lat_deg), Along::Latitude).await?,
+            edges::middles(planning, (&names[1], lon_deg), Along::Longitude).await?,
+        )
+    } else {
+        (lat_deg, lon_deg)
+    };
     let registration = registration(planning, rules, &names, [&lat_deg, &lon_deg]);
     Ok(Mapping::from_labels(
         &lat_deg,

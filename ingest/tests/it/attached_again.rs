@@ -50,6 +50,7 @@ impl Cube {
             source: "a test".to_owned(),
             grid: GRID,
             version: None,
+            statistic: None,
         };
         let repository = Repository::create(&store, "cube", &description).await;
         Self {

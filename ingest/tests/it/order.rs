@@ -154,6 +154,33 @@ async fn a_new_notice_of_an_old_file_puts_it_back_on_purpose() {
     assert!(is_superseded(&outcomes[0]), "{}", outcomes[0]);
 }
 
+/// A folder that holds a file and its revision is given again every night.
+#[tokio::test]
+async fn editions_that_are_given_again_together_stay_as_they_are() {
+    let (place, [first, second]) = editions();
+    through(&place, &[given(&first, 1), given(&second, 2)]).await;
+    let before = place.newest("fgco2").await;
+    for night in 1..4 {
+        let notices = [given(&first, 10 * night), given(&second, 10 * night + 1)];
+        let (outcomes, told) = through(&place, &notices).await;
+        assert!(is_superseded(&outcomes[0]), "{night}: {}", outcomes[0]);
+        let is_there = matches!(outcomes[1], Outcome::AlreadyLanded { .. });
+        assert!(is_there, "{night}: {}", outcomes[1]);
+        assert!(told.is_empty(), "{night}: {told:?}");
+        assert_eq!(place.newest("fgco2").await, before, "{night}");
+    }
+    // What the older one brings beside the revision lands, and the revision is as new then as its last notice.
+    let (place, [first, second]) = editions();
+    edition(2).first_month().write_classic(&second);
+    through(&place, &[given(&second, 2)]).await;
+    through(&place, &[given(&first, 10), given(&second, 11)]).await;
+    assert_eq!(files_of(&place).await, ["second.nc", "first.nc"]);
+    let (outcomes, _) = through(&place, &[given(&first, 10)]).await;
+    let is_there = matches!(outcomes[0], Outcome::Superseded { .. });
+    assert!(is_there, "{}", outcomes[0]);
+    assert_eq!(files_of(&place).await, ["second.nc", "first.nc"]);
+}
+
 /// A sender whose clock is ahead is believed no further than its message's own time.
 #[tokio::test]
 async fn a_notice_is_never_newer_than_its_message() {

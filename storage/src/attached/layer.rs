@@ -40,8 +40,8 @@ const NAME: &str = "attached store";
 /// What is kept of other stores, for all paths to the same objects.
 pub(super) struct Held {
     source: Arc<dyn Source>,
-    /// By the digest of their values, the bytes that a field of them would be.
-    fields: Cache<Digest, Bytes, BySize>,
+    /// By their path, the bytes that a field of them would be: what one store holds says nothing of another that is to hold the same.
+    fields: Cache<String, Bytes, BySize>,
     /// Paths where fields themselves are.
     here: Cache<String, ()>,
     attachments: Cache<(ProductId, Digest), Arc<Attachment>>,
@@ -50,8 +50,8 @@ pub(super) struct Held {
 #[derive(Clone)]
 struct BySize;
 
-impl Weighter<Digest, Bytes> for BySize {
-    fn weight(&self, _key: &Digest, content: &Bytes) -> u64 {
+impl Weighter<String, Bytes> for BySize {
+    fn weight(&self, _path: &String, content: &Bytes) -> u64 {
         content.len() as u64
     }
 }
@@ -137,12 +137,10 @@ impl Layer {
     }
 
     /// The bytes of the field that a reference refers to.
-    async fn content(&self, place: &Place, reference: Reference) -> Result<Bytes> {
+    async fn content(&self, at: &Path, place: &Place, reference: Reference) -> Result<Bytes> {
         let read = self.read(place, reference);
-        self.held
-            .fields
-            .get_or_insert_async(&place.digest, read)
-            .await
+        let fields = &self.held.fields;
+        fields.get_or_insert_async(at.as_ref(), read).await
     }
 
     async fn read(&self, place: &Place, reference: Reference) -> Result<Bytes> {
@@ -208,7 +206,7 @@ impl Layer {
         let Some((mut meta, reference)) = self.reference(at, &place).await? else {
             return Ok(None);
         };
-        let content = self.content(&place, reference).await?;
+        let content = self.content(at, &place, reference).await?;
         meta.size = content.len() as u64;
         Ok(Some((meta, content)))
     }

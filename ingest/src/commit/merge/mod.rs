@@ -9,6 +9,7 @@ use contract::notice::NoticeOrder;
 use contract::quantity::Quantity;
 use contract::time::{Period, TimeMs};
 
+use super::Claim;
 use crate::error::Rejection;
 use crate::put::StoredGranule;
 
@@ -80,9 +81,16 @@ impl Taken {
 }
 
 /// Adds files to the newest manifest, in their order.
-pub(super) fn merge(newest: Option<&Manifest>, granules: &[StoredGranule]) -> Merged {
+pub(super) fn merge(
+    newest: Option<&Manifest>,
+    granules: &[StoredGranule],
+    claims: &[Claim],
+) -> Merged {
     let steps = newest.map_or_else(Vec::new, |m| m.steps.clone());
-    let orders = newest.map_or_else(Vec::new, Manifest::notice_orders);
+    let mut orders = newest.map_or_else(Vec::new, Manifest::notice_orders);
+    for claim in claims {
+        newest.inspect(|newest| claim.apply(newest, &mut orders));
+    }
     let mut placed: Vec<Placed> = steps.into_iter().zip(orders).collect();
     let mut merged = Merged {
         steps: vec![],

@@ -95,7 +95,7 @@ fn month(month: u32) -> Period {
 }
 
 fn placed(first: &StoredGranule) -> Vec<Placed> {
-    let merged = merge(None, std::slice::from_ref(first));
+    let merged = merge(None, std::slice::from_ref(first), &[]);
     merged.steps.into_iter().zip(merged.orders).collect()
 }
 
@@ -104,7 +104,7 @@ fn months_in_any_order_become_steps_in_the_order_of_time() {
     let files: Vec<_> = [3, 1, 2]
         .map(|m| granule(&format!("f{m}"), &[month(m)]))
         .to_vec();
-    let merged = merge(None, &files);
+    let merged = merge(None, &files, &[]);
     let periods: Vec<_> = merged.steps.iter().map(|s| s.period).collect();
     assert_eq!(periods, [month(1), month(2), month(3)]);
     assert!(
@@ -161,6 +161,7 @@ fn another_grid_or_quantity_is_a_conflict() {
             other_quantity,
             made_up,
         ],
+        &[],
     );
     assert_eq!(merged.steps.len(), 1);
     for change in &merged.changes[1..] {

@@ -13,9 +13,27 @@ pub(crate) enum TimeMethod {
 
 /// The method along time; none if the text says nothing of it. `time` is the name of the time coordinate.
 pub(crate) fn of_time(text: &str, time: &str) -> Option<TimeMethod> {
+    let mut found = None;
+    for said in all_of_time(text, time) {
+        let is_within_days = said.windows(2).any(|pair| pair == ["within", "days"]);
+        let method = match said[0].as_str() {
+            _ if is_within_days => TimeMethod::WithinDays,
+            "point" => TimeMethod::Point,
+            _ => TimeMethod::Interval,
+        };
+        // Of a climatology, which has two methods, the first that is no interval counts.
+        if found.is_none_or(|found| found == TimeMethod::Interval) {
+            found = Some(method);
+        }
+    }
+    found
+}
+
+/// What is said of each method along time, in small letters; the method is the first word.
+pub(crate) fn all_of_time(text: &str, time: &str) -> Vec<Vec<String>> {
     let plain = without_comments(text);
     let mut words = plain.split_whitespace().peekable();
-    let mut found = None;
+    let mut all = vec![];
     while words.peek().is_some() {
         let mut is_time = false;
         while let Some(name) = words.next_if(|word| word.ends_with(':')) {
@@ -27,19 +45,10 @@ pub(crate) fn of_time(text: &str, time: &str) -> Option<TimeMethod> {
             said.push(word.to_ascii_lowercase());
         }
         if is_time && !said.is_empty() {
-            let is_within_days = said.windows(2).any(|pair| pair == ["within", "days"]);
-            let method = match said[0].as_str() {
-                _ if is_within_days => TimeMethod::WithinDays,
-                "point" => TimeMethod::Point,
-                _ => TimeMethod::Interval,
-            };
-            // Of a climatology, which has two methods, the first that is no interval counts.
-            if found.is_none_or(|found| found == TimeMethod::Interval) {
-                found = Some(method);
-            }
+            all.push(said);
         }
     }
-    found
+    all
 }
 
 fn without_comments(text: &str) -> String {

@@ -120,6 +120,13 @@ fn check_mapping(file: &Description, variable: &Variable) -> Result<(), Rejectio
         if let Some(said) = said.filter(|said| !said.eq_ignore_ascii_case(GEOGRAPHIC)) {
             return refused(name, format!("grid_mapping_name {said:?}"));
         }
+        let meridian = mapping.attributes.number("longitude_of_prime_meridian");
+        if let Some(meridian) = meridian.filter(|meridian| *meridian != 0.0) {
+            let detail = format!(
+                "counts longitudes from {meridian} degrees east (longitude_of_prime_meridian of its grid_mapping {name:?}); give them from Greenwich"
+            );
+            return Err(Rejection::new(RejectReason::Grid, &variable.name, detail));
+        }
         let wkt = attribute("crs_wkt").or_else(|| attribute("spatial_ref"));
         let is_projected = |wkt: &&str| wkt.to_ascii_uppercase().starts_with("PROJ");
         if said.is_none() && wkt.as_ref().is_some_and(is_projected) {

@@ -1,0 +1,189 @@
+//! Where the cells of an axis are by its bounds (CF 7.1): nothing new where its labels are their middles, else these.
+
+use contract::event::RejectReason;
+use contract::grid::wrap_lon_deg;
+
+use super::Planning;
+use crate::error::{Rejection, Stop};
+use crate::inspect::file::description::Part;
+use crate::plan::cf::packing::Packing;
+
+/// How far bounds may be off, in cells: those of single precision are.
+const TOLERANCE_CELLS: f64 = 0.02;
+
+/// What an axis is of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Along {
+    Latitude,
+    Longitude,
+}
+
+/// The middles of the cells of an axis: its labels, unless its bounds say otherwise.
+///
+/// # Errors
+/// Bounds that are no cells side by side as the labels are.
+pub(super) async fn middles(
+    planning: &mut Planning<'_>,
+    (name, labels): (&str, Vec<f64>),
+    along: Along,
+) -> Result<Vec<f64>, Stop> {
+    let bounds = planning.file.variable(name);
+    let bounds = bounds.and_then(|axis| axis.attributes.text("bounds"));
+    let Some(bounds) = bounds.map(str::to_owned) else {
+        return Ok(labels);
+    };
+    let count = labels.len() as u64;
+    let held = planning.file.variable(&bounds).filter(|variable| {
+        let mut lens = variable.dimensions.iter().map(|own| own.len);
+        variable.is_numeric() && lens.by_ref().eq([count, 2])
+    });
+    let Some(held) = held else {
+        planning.assume(format!(
+            "{name}: names bounds {bounds:?}, which are not there as two numbers a cell; its labels are taken for the middles of cells"
+        ));
+        return Ok(labels);
+    };
+    let packing = Packing::of(held);
+    let stored = planning
+        .values
+        .read(&bounds, &[Part::All, Part::All], count * 2);
+    let values: Vec<f64> = stored
+        .await?
+        .into_iter()
+        .map(|it| packing.value(it))
+        .collect();
+    let (edges, _none) = values.as_chunks::<2>();
+    let found = otherwise(&labels, edges, along).map_err(|reason| {
+        let detail = format!("{reason}; correct them, or state the grid in a profile");
+        Rejection::new(RejectReason::Grid, &bounds, detail)
+    })?;
+    let Some(found) = found else {
+        return Ok(labels);
+    };
+    planning.assume(format!(
+        "{name}: its labels are not the middles of its cells, which lie where its bounds {bounds:?} say"
+    ));
+    Ok(found)
+}
+
+/// The middles of cells by their edges, where they are not the labels.
+fn otherwise(labels: &[f64], edges: &[[f64; 2]], along: Along) -> Result<Option<Vec<f64>>, String> {
+    let [Some(first), Some(last)] = [labels.first(), labels.last()] else {
+        return Ok(None);
+    };
+    let gaps = labels.len().saturating_sub(1).max(1) as f64;
+    let cell = match along {
+        Along::Latitude => (last - first).abs() / gaps,
+        // However often the labels jump back by a turn.
+        Along::Longitude => {
+            let steps = labels.windows(2).map(|two| wrap_lon_deg(two[1] - two[0]));
+            steps.sum::<f64>().abs() / gaps
+        }
+    };
+    if labels.len() < 2 || !(cell.is_finite() && cell > 0.0) {
+        // Refused by their labels.
+        return Ok(None);
+    }
+    let tolerance = TOLERANCE_CELLS * cell;
+    let near = |one: f64, other: f64| (one - other).abs() <= tolerance;
+    let mut middles = Vec::with_capacity(labels.len());
+    let (mut is_of_labels, mut odd) = (true, None);
+    for (label, pair) in labels.iter().zip(edges) {
+        if let Some(bad) = pair.iter().find(|edge| !edge.is_finite()) {
+            return Err(format!("holds {bad}, which is no edge of a cell"));
+        }
+        let edge = |edge: f64| match along {
+            Along::Latitude => edge,
+            Along::Longitude => label + wrap_lon_deg(edge - label),
+        };
+        let [one, other] = pair.map(edge);
+        let (low, high) = (one.min(other), one.max(other));
+        // Cells around a label at a pole end there.
+        let ends = match along {
+            Along::Latitude => [
+                (label - cell / 2.0).max(-90.0),
+                (label + cell / 2.0).min(90.0),
+            ],
+            Along::Longitude => [label - cell / 2.0, label + cell / 2.0],
+        };
+        is_of_labels &= near(low, ends[0]) && near(high, ends[1]);
+        if !near(high - low, cell) || *label < low - tolerance || *label > high + tolerance {
+            odd.get_or_insert((*label, pair));
+        }
+        middles.push(f64::midpoint(low, high));
+    }
+    match odd {
+        _ if is_of_labels => Ok(None),
+        Some((label, [one, other])) => Err(format!(
+            "has a cell from {one} to {other} at the label {label}, where labels stand {cell} degrees apart: these are no cells side by side"
+        )),
+        None => Ok(Some(middles)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn edges(middles: &[f64], cell: f64) -> Vec<[f64; 2]> {
+        let of = |middle: &f64| [middle - cell / 2.0, middle + cell / 2.0];
+        middles.iter().map(of).collect()
+    }
+
+    #[test]
+    fn bounds_about_labels_say_nothing_new() {
+        let lat = [85.0, 75.0, 65.0];
+        let own = edges(&lat, 10.0);
+        assert_eq!(otherwise(&lat, &own, Along::Latitude), Ok(None));
+        // The other way round, and of single precision.
+        let turned: Vec<[f64; 2]> = own.iter().map(|[a, b]| [b + 1e-5, *a]).collect();
+        assert_eq!(otherwise(&lat, &turned, Along::Latitude), Ok(None));
+        let poles = [[-90.0, -89.5], [-89.5, -88.5], [-88.5, -87.5]];
+        let found = otherwise(&[-90.0, -89.0, -88.0], &poles, Along::Latitude);
+        assert_eq!(found, Ok(None));
+        // Across the date line, and around the earth.
+        let lon = [170.0, -180.0, -170.0];
+        let own = [[165.0, 175.0], [175.0, 185.0], [-175.0, -165.0]];
+        assert_eq!(otherwise(&lon, &own, Along::Longitude), Ok(None));
+        assert_eq!(
+            otherwise(
+                &[0.0, 120.0, 240.0],
+                &edges(&[0.0, 120.0, 240.0], 120.0),
+                Along::Longitude
+            ),
+            Ok(None)
+        );
+    }
+
+    #[test]
+    fn labels_at_the_edge_of_their_cells_give_way_to_bounds() {
+        let found = otherwise(
+            &[-80.0, -70.0, -60.0],
+            &edges(&[-75.0, -65.0, -55.0], 10.0),
+            Along::Latitude,
+        );
+        assert_eq!(found, Ok(Some(vec![-75.0, -65.0, -55.0])));
+        let found = otherwise(
+            &[350.0, 0.0, 10.0],
+            &[[350.0, 360.0], [0.0, 10.0], [10.0, 20.0]],
+            Along::Longitude,
+        );
+        assert_eq!(found, Ok(Some(vec![355.0, 5.0, 15.0])));
+    }
+
+    #[test]
+    fn what_are_no_cells_side_by_side_is_refused() {
+        let lat = [-80.0, -70.0, -60.0];
+        let narrow = otherwise(&lat, &edges(&lat, 2.0), Along::Latitude).unwrap_err();
+        assert!(
+            narrow.contains("from -81 to -79 at the label -80"),
+            "{narrow}"
+        );
+        let elsewhere = edges(&[10.0, 20.0, 30.0], 10.0);
+        assert!(otherwise(&lat, &elsewhere, Along::Latitude).is_err());
+        let mut missing = edges(&lat, 10.0);
+        missing[1][0] = f64::NAN;
+        let missing = otherwise(&lat, &missing, Along::Latitude).unwrap_err();
+        assert!(missing.contains("NaN"), "{missing}");
+    }
+}
