@@ -24,7 +24,7 @@ use futures::future::BoxFuture;
 use storage::domain::Cells;
 use storage::{domain, manifests};
 
-use crate::expression::unit::Unit;
+use crate::expression::unit::Scaled;
 use crate::functions::{COMPUTED_EXTENT, COMPUTED_FIELD};
 use crate::publish::{IsStillAsked, check_asked, publish_if};
 use crate::{ComputeError, DeriveProgress, Engine, catalogue};
@@ -150,6 +150,7 @@ impl Plan {
         };
         check(&job)?;
         matched::pressures_of_a_kind(&inputs, &request.how)?;
+        matched::places_of_a_kind(&inputs)?;
         let title = match &request.title {
             Some(title) => title.clone(),
             None if matches!(request.how, Computation::Regrid { .. }) => first.title.clone(),
@@ -325,7 +326,7 @@ fn check(job: &Job) -> Result<(), ComputeError> {
     match Maker::of(job)? {
         Maker::Expression(expression) => {
             let (unit, wanted) = (expression.unit(), job.quantity.unit());
-            if Unit::stored(wanted) != Some(unit) {
+            if Scaled::kept(wanted).map(|scaled| scaled.unit) != Some(unit) {
                 return refused(format!(
                     "the expression comes to {unit}, but {:?} is stored in {wanted}",
                     job.quantity

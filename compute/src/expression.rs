@@ -40,6 +40,10 @@ pub struct Expression {
     schema: SchemaRef,
     /// Of each input, whether a cell without it has no result.
     required: Vec<bool>,
+    /// What stored values of each input are multiplied with.
+    factors: Vec<f64>,
+    /// What results are divided by, to be stored.
+    stored_factor: f64,
     unit: Unit,
     outside: Outside,
 }
@@ -104,11 +108,22 @@ impl Expression {
         let is_required = |(name, _unit): &(String, Unit)| required.contains(name);
         Ok(Self {
             required: inputs.iter().map(is_required).collect(),
+            factors: vec![1.0; inputs.len()],
+            stored_factor: 1.0,
             physical,
             schema,
             unit,
             outside,
         })
+    }
+
+    /// The same over inputs whose stored values are multiplied with `factors` to be of their units of SI, and with results that are stored as
+    /// `stored_factor`th parts: statistics of products are in the units that people read.
+    #[must_use]
+    pub fn with_factors(mut self, factors: Vec<f64>, stored_factor: f64) -> Self {
+        self.factors = factors;
+        self.stored_factor = stored_factor;
+        self
     }
 
     /// Unit of its values.
@@ -127,6 +142,7 @@ impl Expression {
     pub fn evaluate(&self, columns: &[&[f32]]) -> Result<Evaluated, DataFusionError> {
         let cell_count = columns.first().map_or(0, |column| column.len());
         let fits = columns.len() == self.required.len()
+            && columns.len() == self.factors.len()
             && columns.iter().all(|column| column.len() == cell_count);
         if !fits {
             let reason = format!(
@@ -154,7 +170,7 @@ impl Expression {
                 if results.is_null(row) {
                     continue;
                 }
-                let value = results.value(row);
+                let value = results.value(row) / self.stored_factor;
                 if value.is_finite() {
                     values[cell] = value;
                 } else {
@@ -184,11 +200,14 @@ impl Expression {
         columns: &[&[f32]],
         cells: &[usize],
     ) -> Result<Float64Array, DataFusionError> {
-        let column = |values: &&[f32]| -> ArrayRef {
-            let value = |&cell: &usize| Some(f64::from(values[cell])).filter(|it| !it.is_nan());
+        let column = |(values, factor): (&&[f32], &f64)| -> ArrayRef {
+            let value = |&cell: &usize| {
+                let value = f64::from(values[cell]) * factor;
+                Some(value).filter(|it| !it.is_nan())
+            };
             Arc::new(cells.iter().map(value).collect::<Float64Array>())
         };
-        let arrays = columns.iter().map(column).collect();
+        let arrays = columns.iter().zip(&self.factors).map(column).collect();
         let batch = RecordBatch::try_new(Arc::clone(&self.schema), arrays)?;
         let results = self.physical.evaluate(&batch)?.into_array(cells.len())?;
         match results.as_primitive_opt::<Float64Type>() {

@@ -189,6 +189,7 @@ def xarray(folder, work, peer, ring):
         parts["anomalies of months stored"] = time.perf_counter() - begin
     years = middles(times)
     begin = time.perf_counter()
+    off = with_their_line(off, years)
     found["least squares"] = least_squares(off, years)
     parts["least squares"] = time.perf_counter() - begin
     tiles.say("pymannkendall")
@@ -215,6 +216,22 @@ def deseasonalised(window):
     by_month = means.groupby("time.month")
     off = (by_month - by_month.mean()).transpose("time", "lat", "lon")
     return off.values.astype("float64"), means["time"].values
+
+
+def with_their_line(off, years):
+    """Values less their calendar months, `[time, ...]` from a January on, as they are if months' means are found together with a line: of both
+    the months are taken off, and the line that one has along the other is put back."""
+    import numpy as np
+
+    times = np.where(np.isnan(off), np.nan, years.reshape(-1, *[1] * (off.ndim - 1)))
+    less = times.copy()
+    with np.errstate(invalid="ignore", divide="ignore"):
+        for month in range(12):
+            one = less[month::12]
+            count = (~np.isnan(one)).sum(axis=0)
+            less[month::12] -= np.nansum(one, axis=0) / count
+        slope = np.nansum(less * off, axis=0) / np.nansum(less * less, axis=0)
+    return off + slope * (times - less)
 
 
 def stored(climatology, anomaly, place):
@@ -309,6 +326,7 @@ def trends(window, places, years):
     # The first one is a January.
     for calendar in range(12):
         means[calendar::12] -= np.nanmean(means[calendar::12], axis=0)
+    means = with_their_line(means, years)
     with ProcessPoolExecutor(os.cpu_count()) as pool:
         return list(pool.map(in_time_of, [(one, years) for one in means.T], chunksize=25))
 

@@ -121,6 +121,31 @@ pub fn less_their_months(months: &[usize], values: &[f64]) -> Vec<f64> {
     months.iter().zip(values).map(less).collect()
 }
 
+/// The same where values rise or fall along `years`: means of months are found together with a line, by least squares, and the line stays. A
+/// month's own mean has the part of it that falls between the middles of months and takes it off: of K years the slope is less by 1 in K² then
+/// (Frisch and Waugh 1933, doi:10.2307/1907330, of what is left of both).
+pub fn less_their_seasons(months: &[usize], years: &[f64], values: &[f64]) -> Vec<f64> {
+    let less = less_their_months(months, values);
+    let of_value = |(year, value): (&f64, &f64)| if value.is_nan() { f64::NAN } else { *year };
+    let years: Vec<f64> = years.iter().zip(values).map(of_value).collect();
+    let less_years = less_their_months(months, &years);
+    let (mut along, mut across) = (0.0, 0.0);
+    for (x, value) in less_years.iter().zip(&less).filter(|(_, v)| !v.is_nan()) {
+        along += x * value;
+        across += x * x;
+    }
+    // Of one value a month there is no line beside their means.
+    let slope = if across > 0.0 { along / across } else { 0.0 };
+    let line = years
+        .iter()
+        .zip(&less_years)
+        .map(|(x, less)| slope * (x - less));
+    less.iter()
+        .zip(line)
+        .map(|(value, line)| value + line)
+        .collect()
+}
+
 /// Mean of values; none of none.
 pub fn mean(values: &[f64]) -> Option<f64> {
     let sum: f64 = values.iter().sum();

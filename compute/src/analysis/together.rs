@@ -18,6 +18,8 @@ use crate::{ComputeError, Engine};
 
 /// Years from which the mean of a calendar month is more than its one value.
 const SEASONS_FROM_MONTHS: usize = 24;
+/// Shares of a calendar month that differ by more than ten days of a year are different ones.
+const MONTHS_APART: f64 = 10.0 / 365.0;
 
 /// The correlation of two products over a region or at a place.
 ///
@@ -120,6 +122,7 @@ pub fn difference<'a>(
                 .filter(|note| !a.notes.contains(note))
                 .cloned(),
         );
+        notes.extend(of_seasons([(&a, &mean_a), (&b, &mean_b)]));
         Ok(Difference {
             place: a.place.clone(),
             unit: a.cited.unit.clone(),
@@ -133,14 +136,53 @@ pub fn difference<'a>(
     })
 }
 
+/// Are steps short enough to tell months apart?
+fn has_months(series: &ReadSeries) -> bool {
+    longest_s(&series.periods) <= CalendarBins::Month.longest_step_s()
+}
+
+/// Are there two years of months, so that what comes every year is told from what does not?
+fn has_seasons(series: &ReadSeries) -> bool {
+    let months = means_over(&series.periods, &series.values, TimeStep::Month);
+    has_months(series) && months.0.len() >= SEASONS_FROM_MONTHS
+}
+
+/// Share of its time with data that each calendar month has.
+fn shares_of_months(series: &ReadSeries) -> [f64; 12] {
+    let mut shares = [0.0; 12];
+    let here = series.periods.iter().zip(&series.values);
+    for (period, _) in here.filter(|(_, value)| !value.is_nan()) {
+        shares[CalendarBins::Month.of(*period)] += period.seconds();
+    }
+    let all: f64 = shares.iter().sum();
+    shares.map(|own| own / all)
+}
+
+/// What is to be said of the season in a difference: it may be in its error, or be the difference.
+fn of_seasons(sides: [(&ReadSeries, &MeanOverTime); 2]) -> Vec<String> {
+    if sides
+        .iter()
+        .any(|(series, mean)| !has_months(series) || mean.count == 0)
+    {
+        return vec![];
+    }
+    let mut notes = vec![];
+    let [of, minus] = sides.map(|(series, _)| shares_of_months(series));
+    let apart = of.iter().zip(&minus).map(|(a, b)| (a - b).abs());
+    if apart.fold(0.0, f64::max) > MONTHS_APART {
+        notes.push("the two sides hold the months of the year in different shares: part of their difference is the season".to_owned());
+    }
+    let is_short =
+        |(series, mean): &(&ReadSeries, &MeanOverTime)| mean.count > 1 && !has_seasons(series);
+    if sides.iter().any(is_short) {
+        notes.push("a side spans less than two years of months, so that its season cannot be told from chance: the standard error has it, and the p value tells nothing of what comes beside the season".to_owned());
+    }
+    notes
+}
+
 /// Mean of a side, its error by the spread about the mean of each month where there are two years of them.
 fn of_side(series: &ReadSeries) -> MeanOverTime {
-    let is_seasonal = longest_s(&series.periods) <= CalendarBins::Month.longest_step_s()
-        && means_over(&series.periods, &series.values, TimeStep::Month)
-            .0
-            .len()
-            >= SEASONS_FROM_MONTHS;
-    let about = if is_seasonal {
+    let about = if has_seasons(series) {
         deseasonalised(&series.periods, &series.values)
     } else {
         series.values.clone()

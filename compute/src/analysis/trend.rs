@@ -7,7 +7,7 @@ use contract::analysis::{
 };
 use contract::time::{Period, TimeMs, TimeStep};
 
-use super::climatology::{less_their_months, mean, months_of};
+use super::climatology::{less_their_seasons, mean, months_of};
 use super::extremes::percentile;
 use super::linear_trend::least_squares;
 use super::mann_kendall::{LEAST_VALUES, MOST_VALUES, mann_kendall};
@@ -17,7 +17,7 @@ use super::undefined::Undefined;
 
 /// What an answer about a trend is called.
 const WHAT: &str = "a trend";
-/// Years of values that a trend needs: of fewer, each month's own mean takes more than a fifth of what it is taken off from.
+/// Years of values that a trend needs: of fewer, each month's own mean takes more than a fifth of the noise that it is taken off from.
 pub const LEAST_YEARS: f64 = 5.0;
 /// Rounding of the years between two middles: of five years of months 4 years and 11 months lie between them.
 const MONTH_YEARS: f64 = 0.09;
@@ -27,7 +27,7 @@ const DECADE: f64 = 10.0;
 /// The trend of a series through means of `step`, or through steps as they are where those are longer.
 ///
 /// `periods` are in the order of time, `values` beside them in `unit`, NaN no data. Where steps are no longer than months the
-/// mean of each calendar month is taken off first.
+/// season is taken off first: the mean of each calendar month, found together with a line.
 ///
 /// # Errors
 /// Fewer than ten values or five years, more than 12 000 values, or all equal.
@@ -149,7 +149,7 @@ impl TrendSteps {
         let here: Vec<usize> = (0..means.len()).filter(|i| !means[*i].is_nan()).collect();
         let spanned_years = years_of(self.bins.periods(), &means, &here)?;
         let values = match &self.months {
-            Some(months) => less_their_months(months, &means),
+            Some(months) => less_their_seasons(months, &self.years, &means),
             None => means.clone(),
         };
         let of_here = |all: &[f64]| -> Vec<f64> { here.iter().map(|i| all[*i]).collect() };

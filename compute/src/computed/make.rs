@@ -13,7 +13,7 @@ use super::job::{ExtentMade, ExtentTask, FieldMade, FieldTask, Job};
 use super::read::{Inputs, SlidingRows};
 use crate::ComputeError;
 use crate::expression::Expression;
-use crate::expression::unit::Unit;
+use crate::expression::unit::Scaled;
 use crate::regrid::Regridder;
 use crate::workshop::Workshop;
 
@@ -33,8 +33,8 @@ impl Maker {
         Ok(match &job.how {
             Computation::Expression { expression } => {
                 let refused = |reason| ComputeError::Expression { reason };
-                let input = |(name, unit): &(String, String)| match Unit::stored(unit) {
-                    Some(unit) => Ok((name.clone(), unit)),
+                let input = |(name, unit): &(String, String)| match Scaled::kept(unit) {
+                    Some(scaled) => Ok(((name.clone(), scaled.unit), scaled.factor)),
                     None => Err(refused(format!(
                         "{name} is in {unit:?}, which is not understood"
                     ))),
@@ -44,8 +44,11 @@ impl Maker {
                     .iter()
                     .map(input)
                     .collect::<Result<Vec<_>, _>>()?;
+                let (inputs, factors): (Vec<_>, Vec<_>) = inputs.into_iter().unzip();
                 let expression = Expression::read(expression, &inputs).map_err(refused)?;
-                Self::Expression(expression)
+                let result = Scaled::kept(job.quantity.unit());
+                let factor = result.map_or(1.0, |result| result.factor);
+                Self::Expression(expression.with_factors(factors, factor))
             }
             Computation::Regrid {
                 method,

@@ -86,6 +86,56 @@ pub(super) fn pressures_of_a_kind(inputs: &[Input], how: &Computation) -> Result
     }
 }
 
+/// Names of the CO₂ flux (`derive co2-flux`) say what a product is of: water or air, the skin or what lies below. Where products say it as
+/// well, by quantity or standard name, they are not taken for each other.
+///
+/// # Errors
+/// One is given in the place of the other: which.
+pub(super) fn places_of_a_kind(inputs: &[Input]) -> Result<(), ComputeError> {
+    let of = |name: &str| inputs.iter().find(|it| it.name == name);
+    let is = |name: &str, what: Quantity| of(name).is_some_and(|it| it.manifest.quantity == what);
+    let is_flux = ["pco2_water", "fco2_water"]
+        .iter()
+        .any(|name| of(name).is_some());
+    if !is_flux {
+        return Ok(());
+    }
+    for (name, elsewhere, place) in [
+        ("pco2_water", "_in_air", "air"),
+        ("fco2_water", "_in_air", "air"),
+        ("pco2_air", "_in_sea_water", "sea water"),
+        ("fco2_air", "_in_sea_water", "sea water"),
+    ] {
+        let wrong = of(name).filter(|it| it.manifest.quantity.word().ends_with(elsewhere));
+        if let Some(wrong) = wrong {
+            let product = &wrong.manifest.product;
+            return Err(refused(format!(
+                "{product} is given as {name} and is of {place} ({}): water and air are given the other way round",
+                wrong.manifest.quantity.title()
+            )));
+        }
+    }
+    let Some(below) = of("below") else {
+        return Ok(());
+    };
+    if is("below", Quantity::SeaSurfaceSkinTemperature) {
+        let product = &below.manifest.product;
+        return Err(refused(format!(
+            "{product} is given as the temperature below the skin and is that of the skin itself: give it as --temperature"
+        )));
+    }
+    let deep = Quantity::SeaSurfaceFoundationTemperature;
+    let skin = of("temperature").filter(|it| it.manifest.quantity == deep);
+    match skin {
+        Some(skin) => Err(refused(format!(
+            "{} is given as the temperature of the skin, beside one below it, and is {}: give it as --below",
+            skin.manifest.product,
+            skin.manifest.quantity.title()
+        ))),
+        None => Ok(()),
+    }
+}
+
 /// Steps of the result, inside a window, in the order of time.
 ///
 /// # Errors

@@ -1,3 +1,4 @@
+use super::unit::Scaled;
 use super::*;
 
 fn inputs() -> Vec<(String, Unit)> {
@@ -101,6 +102,9 @@ fn mixed_units_and_whatever_is_no_arithmetic_are_refused_with_the_reason() {
         ("sst + wind", "one is in K, the other in m s-1"),
         ("sst - 273.15", "one is in K, the other in 1"),
         ("ice > sst", "one is in 1, the other in K"),
+        ("sst + unit(0.17, 'degC')", "written in K: unit(0.17, 'K')"),
+        ("unit(0.17, 'degC') + sst", "written in K"),
+        ("sst + -unit(0.17, 'degC')", "written in K"),
         (
             "CASE WHEN ice > 0.1 THEN sst ELSE wind END",
             "branches of CASE",
@@ -134,4 +138,27 @@ fn mixed_units_and_whatever_is_no_arithmetic_are_refused_with_the_reason() {
         assert!(refused.contains(reason), "{text}: {refused}");
         assert!(!refused.contains('\n'), "{refused}");
     }
+}
+
+/// Statistics are kept in units that people read.
+#[test]
+fn inputs_and_results_of_other_units_are_of_si_in_between() {
+    let rise = Scaled::kept("K year-1").unwrap();
+    let inputs = [("rise".to_owned(), rise.unit)];
+    let values = |text: &str, stored: &str| {
+        let stored = Scaled::kept(stored).unwrap();
+        let read = Expression::read(text, &inputs).unwrap();
+        assert_eq!(read.unit(), stored.unit, "{text}");
+        let read = read.with_factors(vec![rise.factor], stored.factor);
+        read.evaluate(&[&[0.5, f32::NAN]]).unwrap().values
+    };
+    close(&values("rise * unit(10, 'year')", "K"), &[5.0, f64::NAN]);
+    close(&values("rise * 2", "K year-1"), &[1.0, f64::NAN]);
+    let day = values("rise", "K day-1")[0];
+    assert!((day * 365.25 - 0.5).abs() < 1e-12, "{day}");
+    assert_eq!(
+        Scaled::kept("kg m-2 s-1").unwrap().factor.to_bits(),
+        1.0_f64.to_bits()
+    );
+    assert_eq!(Scaled::kept("degC"), None);
 }

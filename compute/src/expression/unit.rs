@@ -117,6 +117,18 @@ impl Display for Unit {
 }
 
 impl Scaled {
+    /// The unit of stored values, one of SI or so many of one, as those of statistics: `K year-1`, `g m-2 year-1`, `day`; none if it begins
+    /// elsewhere.
+    pub fn kept(text: &str) -> Option<Self> {
+        let scaled = Self::parse(text).filter(|scaled| scaled.offset == 0.0)?;
+        // A hair beside one is one: the bits of values stay.
+        let is_one = (scaled.factor - 1.0).abs() < 1e-12;
+        Some(Self {
+            factor: if is_one { 1.0 } else { scaled.factor },
+            ..scaled
+        })
+    }
+
     /// Reads `cm h-1`, `kg m-2 s-1`, `µatm`, `degC`, `1`; none if a part of it is unknown.
     pub fn parse(text: &str) -> Option<Self> {
         let text = text.trim();

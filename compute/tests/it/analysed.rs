@@ -366,6 +366,42 @@ async fn periods_versions_and_products_are_compared() {
     let later = later.await.unwrap();
     assert!((later.difference.unwrap() - 0.15).abs() < 1e-3, "{later:?}");
     assert!(later.p_value.unwrap() < 1e-3 && later.of.count == 60);
+    assert!(later.notes.is_empty(), "{later:?}");
+    // A year has its season in its error, and half a year beside a whole one in the difference.
+    for (of, minus, notes) in [
+        (
+            ("2006-01-01", "2007-01-01"),
+            ("2001-01-01", "2006-01-01"),
+            &["less than two years"][..],
+        ),
+        (
+            ("2006-01-01", "2009-01-01"),
+            ("2001-07-01", "2005-01-01"),
+            &["different shares"],
+        ),
+        (
+            ("2006-07-01", "2007-01-01"),
+            ("2001-01-01", "2002-01-01"),
+            &["different shares", "less than two years"],
+        ),
+    ] {
+        let inside = |(from, to): (&str, &str)| {
+            let mut query =
+                RegionSeriesQuery::new(product("wind"), "-140,-19,-120,-10".parse().unwrap());
+            (query.from, query.to) = (from.parse().ok(), to.parse().ok());
+            SeriesQuery::Region(query)
+        };
+        let (of, minus) = (inside(of), inside(minus));
+        let found = analysis::difference(&engine, ((&first, &a), &of), ((&first, &a), &minus));
+        let found = found.await.unwrap();
+        assert_eq!(found.notes.len(), notes.len(), "{:?}", found.notes);
+        let is_said = |(note, part): (&String, &&str)| note.contains(*part);
+        assert!(
+            found.notes.iter().zip(notes).all(is_said),
+            "{:?}",
+            found.notes
+        );
+    }
     let versions = analysis::difference(&engine, ((&second, &b), &all), ((&first, &a), &all));
     assert!((versions.await.unwrap().difference.unwrap() - 1.0).abs() < 1e-6);
     for (minus, reason) in [

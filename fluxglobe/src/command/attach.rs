@@ -1,6 +1,7 @@
 //! `fluxglobe attach`: a store of others in, a product of its values out that are not copied.
 
 use anyhow::{Context as _, Result};
+use contract::masked::MaskedCells;
 use ingest::attach::{Attached, Request};
 use serde::Serialize;
 
@@ -19,6 +20,7 @@ struct Line {
     steps: usize,
     steps_read: usize,
     stored_bytes: u64,
+    masked: MaskedCells,
     assumptions: Vec<String>,
 }
 
@@ -64,6 +66,9 @@ pub(crate) async fn run(settings: &Settings, options: &Attach) -> Result<()> {
     for assumption in &attached.assumptions {
         progress::say(&format!("assumed: {assumption}"));
     }
+    if !attached.masked.is_none() {
+        progress::say(&attached.masked.to_string());
+    }
     if options.json {
         let text = serde_json::to_string_pretty(&Line::of(&attached))?;
         return progress::result(&text);
@@ -87,6 +92,7 @@ impl Line {
             steps: attached.steps,
             steps_read: attached.read,
             stored_bytes: attached.stored_bytes,
+            masked: attached.masked,
             assumptions: attached.assumptions.clone(),
         }
     }

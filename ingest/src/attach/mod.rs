@@ -19,6 +19,7 @@ mod steps;
 mod survey;
 
 use contract::manifest::ManifestId;
+use contract::masked::MaskedCells;
 use contract::product::ProductId;
 use storage::Store;
 use storage::attached::{Attachment, StoreKind};
@@ -65,6 +66,8 @@ pub struct Attached {
     pub read: usize,
     /// Bytes that were stored for them: references, what they refer to, and the domain.
     pub stored_bytes: u64,
+    /// What was masked in the steps that were read.
+    pub masked: MaskedCells,
     /// What was taken for granted, because nothing there says it. One line each.
     pub assumptions: Vec<String>,
 }

@@ -91,6 +91,7 @@ pub(super) async fn publish(
         read: wanted.len(),
         stored_bytes: stored_bytes(store, &version).await?,
         version: version.id(),
+        masked: read.masked,
         assumptions: plan.assumptions,
     })
 }

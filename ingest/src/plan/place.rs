@@ -40,6 +40,9 @@ pub(super) async fn mapping(
         return Err(coordinate::no_grid(planning.file, variable).into());
     };
     check_others(variable, &axes)?;
+    if planning.profile.is_none() {
+        told_by_length(planning, variable, &axes)?;
+    }
     let (cells, most) = (
         u128::from(lat.len) * u128::from(lon.len),
         planning.limits.plane_cells,
@@ -174,6 +177,41 @@ fn check_others(variable: &Variable, axes: &[Axis]) -> Result<(), Rejection> {
             Err(refused(&variable.name, detail))
         }
     }
+}
+
+/// Notes axes that nothing but their length tells, and refuses those that their length does not tell.
+fn told_by_length(
+    planning: &mut Planning<'_>,
+    variable: &Variable,
+    axes: &[Axis],
+) -> Result<(), Rejection> {
+    let unnamed = axes.iter().zip(&variable.dimensions);
+    let unnamed = unnamed.filter(|(_, dimension)| dimension.name.is_none());
+    for (axis, dimension) in unnamed {
+        let Some(coordinate) = &axis.coordinate else {
+            continue;
+        };
+        let is_other = |other: &&Variable| {
+            let role = coordinate::role_of(other);
+            other.is_coordinate()
+                && other.is_numeric()
+                && other.dimensions[0].len == dimension.len
+                && role != Role::Other
+                && role != axis.role
+        };
+        if let Some(other) = planning.file.variables.iter().find(is_other) {
+            let detail = format!(
+                "names no dimensions, and {coordinate} and {} are of one length: nothing says which goes along which axis; name its dimensions, or give a profile that states the grid",
+                other.name
+            );
+            return Err(refused(&variable.name, detail));
+        }
+        planning.assume(format!(
+            "{}: names no dimensions; that of {} is taken for {coordinate}, which alone is as long",
+            variable.name, dimension.len
+        ));
+    }
+    Ok(())
 }
 
 fn stated_mapping(

@@ -172,3 +172,62 @@ fn partial_pressure_and_fugacity_are_not_mixed_unless_one_is_converted() {
     let named = [of("pco2_water", Quantity::Fco2)];
     assert!(said(ask(&named, "pco2_water")).contains("pco2_water holds CO₂ fugacity"));
 }
+
+#[test]
+fn water_is_no_air_and_the_skin_is_not_below_itself() {
+    let of = |name: &str, quantity| {
+        let mut input = input(
+            "p",
+            one_degree(3),
+            &months(2010, 1..=1),
+            Matching::SamePeriod,
+        );
+        input.name = name.to_owned();
+        input.manifest.quantity = quantity;
+        input
+    };
+    let open = |place: &str| {
+        let name = format!("surface_partial_pressure_of_carbon_dioxide_in_{place}");
+        Quantity::open(&name, "Pa", "Pressure").unwrap()
+    };
+    let [skin, foundation] = [
+        Quantity::SeaSurfaceSkinTemperature,
+        Quantity::SeaSurfaceFoundationTemperature,
+    ];
+    let water = || of("pco2_water", open("sea_water"));
+    let right = [
+        water(),
+        of("pco2_air", open("air")),
+        of("temperature", skin),
+        of("below", foundation),
+    ];
+    places_of_a_kind(&right).unwrap();
+    places_of_a_kind(&[water(), of("temperature", foundation)]).unwrap();
+    for (inputs, reason) in [
+        (
+            vec![of("pco2_water", open("air"))],
+            "p is given as pco2_water and is of air",
+        ),
+        (
+            vec![water(), of("pco2_air", open("sea_water"))],
+            "is of sea water",
+        ),
+        (
+            vec![water(), of("temperature", foundation), of("below", skin)],
+            "give it as --temperature",
+        ),
+        (
+            vec![
+                water(),
+                of("temperature", foundation),
+                of("below", Quantity::SeaSurfaceTemperature),
+            ],
+            "give it as --below",
+        ),
+    ] {
+        let refused = said(places_of_a_kind(&inputs));
+        assert!(refused.contains(reason), "{refused}");
+    }
+    // Whoever writes an expression calls things as he likes.
+    places_of_a_kind(&[of("below", skin), of("temperature", foundation)]).unwrap();
+}

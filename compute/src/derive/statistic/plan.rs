@@ -25,8 +25,17 @@ use super::stored::Stored;
 use crate::ComputeError;
 use crate::analysis::timeline::longest_s;
 
-/// Version of the way statistics are made: it changes when their bits do.
-const METHOD: u32 = 1;
+/// Version of the way a statistic is made: it changes when its bits do.
+fn method(statistic: MapStatistic) -> u32 {
+    match statistic {
+        // Means of months are found together with a line since.
+        MapStatistic::Trend
+        | MapStatistic::TrendPValue
+        | MapStatistic::LeastSquaresTrend
+        | MapStatistic::LeastSquaresTrendPValue => 2,
+        _ => 1,
+    }
+}
 
 /// A step that is written.
 #[derive(Debug, Clone)]
@@ -83,6 +92,7 @@ pub(super) struct Plan {
 #[derive(Serialize)]
 struct MadeOf<'a> {
     kind: &'static str,
+    /// That of [`method`].
     method: u32,
     options: &'a MapOptions,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -248,7 +258,7 @@ fn outputs(
     let made_of = |output: usize| {
         Digest::of_json(&MadeOf {
             kind: "statistic",
-            method: METHOD,
+            method: method(statistic),
             options,
             region: options.region.as_ref().map(|asked| &asked.region),
             base,

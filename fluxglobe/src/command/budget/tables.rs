@@ -2,7 +2,7 @@
 
 use comfy_table::presets::NOTHING;
 use comfy_table::{CellAlignment, Table};
-use contract::budget::{BudgetAnswer, BudgetHistory, BudgetRow};
+use contract::budget::{BudgetAnswer, BudgetHistory, BudgetRow, RowDraws};
 
 use super::M2_PER_MILLION_KM2;
 use crate::progress;
@@ -22,6 +22,7 @@ pub(super) fn of(answer: &BudgetAnswer) -> Table {
     let columns = Columns {
         region: !answer.regions.is_empty(),
         uncertainty: answer.uncertainty.is_some(),
+        draws: answer.rows.iter().any(|row| draws(row).is_some()),
         river: answer.river.is_some(),
         completeness: answer.rows.iter().any(|row| row.completeness.is_some()),
     };
@@ -35,6 +36,11 @@ pub(super) fn of(answer: &BudgetAnswer) -> Table {
         table.add_row(columns.cells(&answer.region, row));
     }
     table
+}
+
+/// What random errors came to.
+fn draws(row: &BudgetRow) -> Option<RowDraws> {
+    row.uncertainty.and_then(|own| own.monte_carlo)
 }
 
 fn table(header: Vec<&str>) -> Table {
@@ -58,6 +64,7 @@ fn table(header: Vec<&str>) -> Table {
 struct Columns {
     region: bool,
     uncertainty: bool,
+    draws: bool,
     river: bool,
     completeness: bool,
 }
@@ -71,6 +78,9 @@ impl Columns {
         header.extend(["from", "to", "Tg C"]);
         if self.uncertainty {
             header.push("±");
+        }
+        if self.draws {
+            header.extend(["drawn ±", "2.5 to 97.5 % of draws"]);
         }
         if self.river {
             header.extend(["rivers Tg C", "anthropogenic Tg C"]);
@@ -105,6 +115,14 @@ impl Columns {
         ]);
         if self.uncertainty {
             cells.push(optional(row.uncertainty.map(|own| own.sigma_tg)));
+        }
+        if self.draws {
+            let drawn = draws(row);
+            let sigma = |own: RowDraws| format!("{:.3} ± {:.3}", own.sigma_tg, own.sigma_error_tg);
+            let between = |own: RowDraws| format!("{:.3} to {:.3}", own.p2_5_tg, own.p97_5_tg);
+            let unknown = || "unknown".to_owned();
+            cells.push(drawn.map_or_else(unknown, sigma));
+            cells.push(drawn.map_or_else(unknown, between));
         }
         if self.river {
             let of = |part: fn(&contract::budget::RowRiver) -> f64| {
