@@ -11,7 +11,6 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use contract::manifest::Manifest;
 use contract::product::ProductId;
-use contract::quantity::Quantity;
 use futures::future::BoxFuture;
 use storage::{Store, manifests};
 
@@ -20,6 +19,7 @@ use crate::derive::{
     Progress, StatisticRequest, chosen_start, derive_accumulated_if, derive_statistics_if,
 };
 use crate::publish::{IsStillAsked, MADE_AGAIN, first_instant};
+use crate::summed::has_budget;
 use crate::{ComputeError, Engine, catalogue};
 use order::Order;
 use recipe::Recipe;
@@ -48,7 +48,7 @@ pub fn follow_telling<'a>(
 ) -> BoxFuture<'a, Result<Vec<Manifest>, ComputeError>> {
     Box::pin(async move {
         let source = catalogue::product(engine.store(), product).await?;
-        if is_accumulated(&source) {
+        if is_accumulated(engine.store(), &source).await? {
             product.accumulated()?;
         }
         let mut order = Order::of(product, recipes(engine.store()).await?);
@@ -93,10 +93,8 @@ async fn recipes(store: &Store) -> Result<BTreeMap<ProductId, Recipe>, ComputeEr
         let Some(latest) = newest(store, &product).await? else {
             continue;
         };
-        if let Some(target) = product
-            .accumulated()
-            .ok()
-            .filter(|_| is_accumulated(&latest))
+        if let Ok(target) = product.accumulated()
+            && is_accumulated(store, &latest).await?
         {
             recipes.insert(target, Recipe::Accumulated(product.clone()));
         }
@@ -131,13 +129,16 @@ async fn asked_now(
     Ok(told(target, asked)?.flatten())
 }
 
-/// Is carbon accumulated of it? Of a flux that landed or was computed, and of no mean of one.
-fn is_accumulated(source: &Manifest) -> bool {
+/// Is carbon accumulated of it? Of a flux that landed or was computed, and of no mean or extreme of one.
+async fn is_accumulated(store: &Store, source: &Manifest) -> Result<bool, ComputeError> {
     let is_by_step = source
         .computed
         .as_ref()
         .is_some_and(|it| it.how.is_by_step());
-    source.quantity == Quantity::CarbonFlux && (source.derived_from.is_none() || is_by_step)
+    if source.derived_from.is_some() && !is_by_step {
+        return Ok(false);
+    }
+    has_budget(store, source).await
 }
 
 /// What came of making products.

@@ -1,5 +1,6 @@
 //! The versions that a derived one was made from, as its manifest says it.
 
+use contract::computed::Computation;
 use contract::manifest::{Manifest, ManifestId};
 use contract::product::ProductId;
 use storage::{Store, manifests};
@@ -24,7 +25,7 @@ pub(crate) fn is_from_newer(latest: &Manifest, derived: &Manifest) -> bool {
     is_of_same && numbers().all(|(a, b)| a >= b) && numbers().any(|(a, b)| a > b)
 }
 
-/// Products whose newest versions are made of a product.
+/// Products whose newest versions are made of a product cell by cell, on its grid.
 ///
 /// # Errors
 /// What reading them meets.
@@ -35,12 +36,15 @@ pub(crate) async fn made_of(
     let mut found = vec![];
     for other in manifests::products(store).await? {
         let latest = manifests::latest(store, &other).await?;
-        let is_of_it = |latest: Manifest| match &latest.computed {
-            None => latest.derived_from.is_some_and(|of| of.product == *product),
-            Some(computed) => {
+        // Statistics of one product follow it to another grid.
+        let is_of_it = |latest: Manifest| {
+            let computed = latest.computed.filter(|computed| {
+                !matches!(computed.how, Computation::Statistic { .. }) && computed.follows()
+            });
+            computed.is_some_and(|computed| {
                 let mut inputs = computed.inputs.iter();
                 inputs.any(|input| input.manifest.product == *product)
-            }
+            })
         };
         if latest.is_some_and(is_of_it) {
             found.push(other);

@@ -1,5 +1,6 @@
-//! What may be summed over area and time: a flux of carbon, and no extreme of one.
+//! What may be summed over area and time, a flux of carbon and no extreme of one; and what may be averaged, no days of a year that goes round.
 
+use contract::ContractError;
 use contract::analysis::MapStatistic;
 use contract::computed::Computation;
 use contract::manifest::Manifest;
@@ -25,30 +26,66 @@ pub async fn has_budget(store: &Store, manifest: &Manifest) -> Result<bool, Comp
 }
 
 /// # Errors
-/// `NotSummed` of the highest or lowest values or a percentile of each cell, and of these on another grid: cells of which each has its
-/// value from another time were never there together.
+/// `NotSummed` of the highest or lowest values or a percentile of each cell, and of these on another grid or averaged: cells of which each has
+/// its value from another time were never there together.
 pub(crate) async fn check_summed(store: &Store, manifest: &Manifest) -> Result<(), ComputeError> {
-    let mut regridded = None;
+    let mut source = None;
     loop {
-        let own = regridded.as_ref().unwrap_or(manifest);
+        let own = source.as_ref().unwrap_or(manifest);
         let Some(computed) = &own.computed else {
             return Ok(());
         };
-        let from = computed.inputs.first().map(|input| &input.manifest);
-        match (&computed.how, from) {
-            (Computation::Statistic { statistic, .. }, Some(of)) if is_extreme(*statistic) => {
+        let Some(from) = computed.inputs.first().map(|input| &input.manifest) else {
+            return Ok(());
+        };
+        match &computed.how {
+            Computation::Statistic { statistic, .. } if is_extreme(*statistic) => {
                 return Err(ComputeError::NotSummed {
                     product: manifest.product.clone(),
                     what: in_words(*statistic),
-                    of: of.product.clone(),
+                    of: from.product.clone(),
                 });
             }
-            (Computation::Regrid { .. }, Some(from)) => {
-                regridded = Some(manifests::load(store, from).await?);
+            // What keeps the quantity of what it is made of.
+            Computation::Regrid { .. }
+            | Computation::Statistic {
+                statistic: MapStatistic::Mean | MapStatistic::Climatology,
+                ..
+            } => {
+                let found = match manifests::load(store, from).await {
+                    Ok(found) => Some(found),
+                    // That version is let go; of what kind the product is the newest one says.
+                    Err(error) if error.is_not_found() => {
+                        manifests::latest(store, &from.product).await?
+                    }
+                    Err(error) => return Err(error.into()),
+                };
+                match found {
+                    Some(found) if found.product != manifest.product => source = Some(found),
+                    _ => return Ok(()),
+                }
             }
             _ => return Ok(()),
         }
     }
+}
+
+/// # Errors
+/// Of the phase of the year's wave: 31 December and 1 January are next to each other, and the mean of their numbers lies in July.
+pub(crate) fn check_averaged(manifest: &Manifest) -> Result<(), ContractError> {
+    let statistic = manifest
+        .computed
+        .as_ref()
+        .and_then(|own| own.how.statistic());
+    if statistic != Some(MapStatistic::Phase) {
+        return Ok(());
+    }
+    let reason = "it holds days of the year, which go round: the mean of 1 January and 31 December is no day in July; ask for single places";
+    Err(ContractError::invalid(
+        "product",
+        manifest.product.as_str(),
+        reason,
+    ))
 }
 
 fn is_extreme(statistic: MapStatistic) -> bool {

@@ -160,6 +160,16 @@ pub fn of_values(description: &Description) -> Map<String, Value> {
     attributes
 }
 
+/// Says more of the values, after what is said.
+fn add_comment(attributes: &mut Map<String, Value>, comment: &str) {
+    let before = attributes.get("comment").and_then(Value::as_str);
+    let all = before.map_or_else(
+        || comment.to_owned(),
+        |before| format!("{before}; {comment}"),
+    );
+    attributes.insert("comment".to_owned(), all.into());
+}
+
 /// Name of the variable that tells how much of a cell of a level holds data.
 pub(crate) fn coverage(quantity: Quantity) -> String {
     const NAME: &str = "coverage";
@@ -188,7 +198,7 @@ pub(crate) fn of_level_values(description: &Description) -> Map<String, Value> {
             "; rounded to {KEPT_BITS} bits behind the leading one, which is 2^-16 of a value at most"
         ),
     };
-    attributes.insert("comment".to_owned(), format!("{comment}{rounded}").into());
+    add_comment(&mut attributes, &format!("{comment}{rounded}"));
     if Method::of(quantity) != Method::Sample {
         attributes.insert("quantization_nsb".to_owned(), KEPT_BITS.into());
     }
@@ -223,7 +233,7 @@ pub(crate) fn of_ranges() -> Map<String, Value> {
 pub(crate) fn of_series(description: &Description) -> Map<String, Value> {
     let mut attributes = of_values(description);
     let comment = "a copy of the values for reading along time, of runs of 128 steps from the first one on; NaN, too, where a run is not made yet, which steps_sha256 tells by zeros, and at the end of the last one, which lacks the newest steps";
-    attributes.insert("comment".to_owned(), comment.into());
+    add_comment(&mut attributes, comment);
     attributes
 }
 

@@ -152,7 +152,10 @@ impl Migration<'_> {
 
     /// Is this state that version, with its steps?
     fn describes(&self, cube: &Cube, manifest: &Manifest) -> Result<(), CubeError> {
-        let (found, wanted) = (cube.description(), Description::of(manifest));
+        let found = cube.description();
+        let mut wanted = Description::of(manifest);
+        // Cubes of before say nothing of it.
+        wanted.statistic = found.statistic.and(wanted.statistic);
         if *found != wanted {
             let of = |it: &Description| {
                 let version = it.version.as_ref().map(ToString::to_string);

@@ -189,8 +189,7 @@ def xarray(folder, work, peer, ring):
         parts["anomalies of months stored"] = time.perf_counter() - begin
     years = middles(times)
     begin = time.perf_counter()
-    off = with_their_line(off, years)
-    found["least squares"] = least_squares(off, years)
+    found["least squares"] = least_squares(*with_their_line(off, years), years)
     parts["least squares"] = time.perf_counter() - begin
     tiles.say("pymannkendall")
     has_trend = (~np.isnan(off)).sum(axis=0) >= LEAST_VALUES
@@ -220,7 +219,7 @@ def deseasonalised(window):
 
 def with_their_line(off, years):
     """Values less their calendar months, `[time, ...]` from a January on, as they are if months' means are found together with a line: of both
-    the months are taken off, and the line that one has along the other is put back."""
+    the months are taken off, and the line that one has along the other is put back. Squares of times beside the months, and how many months there are."""
     import numpy as np
 
     times = np.where(np.isnan(off), np.nan, years.reshape(-1, *[1] * (off.ndim - 1)))
@@ -231,7 +230,8 @@ def with_their_line(off, years):
             count = (~np.isnan(one)).sum(axis=0)
             less[month::12] -= np.nansum(one, axis=0) / count
         slope = np.nansum(less * off, axis=0) / np.nansum(less * less, axis=0)
-    return off + slope * (times - less)
+        count = sum((~np.isnan(off[month::12])).any(axis=0) for month in range(12))
+        return off + slope * (times - less), np.nansum(less * less, axis=0), count
 
 
 def stored(climatology, anomaly, place):
@@ -266,7 +266,7 @@ def middles(months):
     return (middle - middle[0]).astype("float64") / 86_400_000 / YEAR_DAYS
 
 
-def least_squares(values, years):
+def least_squares(values, squared_years, month_count, years):
     """Slope a year and its p value of each cell, of values in `[time, lat, lon]`, NaN no data."""
     import numpy as np
     from scipy.stats import t
@@ -282,8 +282,9 @@ def least_squares(values, years):
         squares = (left**2).sum(axis=0)
         pairs = (here[:-1] & here[1:]).sum(axis=0)
         r = np.clip((left[:-1] * left[1:]).sum(axis=0) / pairs * (steps - 1) / steps / (squares / n), 0, 1)
-        freedom = n * (1 - r) / (1 + r) - 2
-        error = np.sqrt(squares / freedom / squares_x)
+        effective = n * (1 - r) / (1 + r)
+        freedom = effective - 2 - (month_count - 1) * effective / n
+        error = np.sqrt(squares / freedom / squared_years)
         p = 2 * t.sf(np.abs(slope / error), freedom)
     is_told = n >= LEAST_VALUES
     return {"least-squares-trend": np.where(is_told, slope, np.nan), "least-squares-trend-p-value": np.where(is_told, p, np.nan)}
@@ -326,9 +327,9 @@ def trends(window, places, years):
     # The first one is a January.
     for calendar in range(12):
         means[calendar::12] -= np.nanmean(means[calendar::12], axis=0)
-    means = with_their_line(means, years)
+    lined, _squares, _months = with_their_line(means, years)
     with ProcessPoolExecutor(os.cpu_count()) as pool:
-        return list(pool.map(in_time_of, [(one, years) for one in means.T], chunksize=25))
+        return list(pool.map(in_time_of, [(one, line, years) for one, line in zip(means.T, lined.T)], chunksize=25))
 
 
 def in_time_of(asked):
@@ -336,13 +337,13 @@ def in_time_of(asked):
     import numpy as np
     from scipy.stats import norm, rankdata, theilslopes
 
-    values, years = asked
+    values, lined, years = asked
     here = ~np.isnan(values)
     score = np.sign(values[here][None, :] - values[here][:, None])[np.triu_indices(here.sum(), 1)].sum()
-    slope = theilslopes(values[here], years[here])[0]
+    slope = theilslopes(lined[here], years[here])[0]
     steps, n = len(values), here.sum()
     ranks = np.zeros(steps)
-    ranks[here] = rankdata((values - slope * years)[here]) - (n + 1) / 2
+    ranks[here] = rankdata((lined - slope * years)[here]) - (n + 1) / 2
     squares, all_of_them = (ranks**2).sum(), 0.0
     for lag in range(1, steps):
         pairs = (here[lag:] & here[:-lag]).sum()

@@ -101,6 +101,53 @@ fn a_flipped_bit_of_a_cube_is_named_with_product_array_and_chunk() {
     assert_eq!(parts.len(), 5, "{parts:?}");
 }
 
+/// What `verify` advises for a damaged cube mends that of a product that is no flux too, which has no budget.
+#[test]
+fn what_is_no_flux_is_made_again_as_verify_advises() {
+    let data = data();
+    let data = data.path();
+    let derive = [
+        "derive",
+        "statistic",
+        "--product",
+        "fgco2",
+        "--statistic",
+        "count,max",
+    ];
+    program::succeed(data, &derive).unwrap();
+    for product in ["fgco2-count", "fgco2-max"] {
+        let chunks = data.join("objects/cubes").join(product).join("chunks");
+        flip(&files(&chunks)[0]);
+        let verify = ["verify", "--product", product];
+        let output = program::run(data, &verify).unwrap();
+        let advice = format!(
+            "{}{}",
+            String::from_utf8_lossy(&output.stdout),
+            String::from_utf8_lossy(&output.stderr)
+        );
+        assert!(
+            advice.contains("fluxglobe recompute --product PRODUCT --verify"),
+            "{advice}"
+        );
+        let mend = [
+            "recompute",
+            "--product",
+            product,
+            "--verify",
+            "--what",
+            "frames,statistics,budget",
+        ];
+        program::succeed(data, &mend).unwrap();
+        program::succeed(data, &verify).unwrap();
+        let refused = program::fail(
+            data,
+            &["recompute", "--product", product, "--what", "budget"],
+        )
+        .unwrap();
+        assert!(refused.contains("budget"), "{refused}");
+    }
+}
+
 #[test]
 fn a_damaged_journal_ends_a_command_with_its_entry_and_stays_as_it_is() {
     let data = data();

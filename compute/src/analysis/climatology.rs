@@ -121,29 +121,78 @@ pub fn less_their_months(months: &[usize], values: &[f64]) -> Vec<f64> {
     months.iter().zip(values).map(less).collect()
 }
 
-/// The same where values rise or fall along `years`: means of months are found together with a line, by least squares, and the line stays. A
-/// month's own mean has the part of it that falls between the middles of months and takes it off: of K years the slope is less by 1 in K² then
-/// (Frisch and Waugh 1933, doi:10.2307/1907330, of what is left of both).
-pub fn less_their_seasons(months: &[usize], years: &[f64], values: &[f64]) -> Vec<f64> {
+/// What is left of a value that is taken off from itself, as a share of the largest: rounding. Stored values have seven digits.
+const ROUNDING: f64 = 1e-12;
+
+/// [`less_their_months`]; of a season and nothing else nothing is left, not even rounding.
+pub fn less_their_months_exactly(months: &[usize], values: &[f64]) -> Vec<f64> {
+    let present = values.iter().filter(|value| !value.is_nan());
+    let largest = present.fold(0.0, |most: f64, value| most.max(value.abs()));
+    let left = |value: f64| {
+        if value.abs() <= ROUNDING * largest {
+            0.0
+        } else {
+            value
+        }
+    };
     let less = less_their_months(months, values);
-    let of_value = |(year, value): (&f64, &f64)| if value.is_nan() { f64::NAN } else { *year };
-    let years: Vec<f64> = years.iter().zip(values).map(of_value).collect();
-    let less_years = less_their_months(months, &years);
-    let (mut along, mut across) = (0.0, 0.0);
-    for (x, value) in less_years.iter().zip(&less).filter(|(_, v)| !v.is_nan()) {
-        along += x * value;
-        across += x * x;
+    less.into_iter().map(left).collect()
+}
+
+/// A series without its season.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Seasonless {
+    /// Values less the means of their calendar months, which take with them what rises within a year: no trend, no rise.
+    pub less: Vec<f64>,
+    /// The same with the line that was found together with the means of months: rising as the series does.
+    pub with_line: Vec<f64>,
+    /// What squares of times come to beside the means of months, years²: how well a slope is known.
+    pub squared_years: f64,
+    /// Calendar months that have values.
+    pub month_count: usize,
+}
+
+impl Seasonless {
+    /// Means of months and a line along `years` found together by least squares: of what is left of both without the months (Frisch and Waugh 1933,
+    /// doi:10.2307/1907330). The mean of a month alone has the part of a line that falls between the middles of months and takes it off: of K whole years
+    /// the slope would be less by 1 in K², and of a few values here and there by far more.
+    pub fn of(months: &[usize], years: &[f64], values: &[f64]) -> Self {
+        let less = less_their_months_exactly(months, values);
+        let of_value = |(year, value): (&f64, &f64)| if value.is_nan() { f64::NAN } else { *year };
+        let years: Vec<f64> = years.iter().zip(values).map(of_value).collect();
+        let less_years = less_their_months_exactly(months, &years);
+        let (mut along, mut squared_years) = (0.0, 0.0);
+        for (x, value) in less_years.iter().zip(&less).filter(|(_, v)| !v.is_nan()) {
+            along += x * value;
+            squared_years += x * x;
+        }
+        // Of one value a month there is no line beside their means.
+        let slope = if squared_years > 0.0 {
+            along / squared_years
+        } else {
+            0.0
+        };
+        let line = years
+            .iter()
+            .zip(&less_years)
+            .map(|(x, less)| slope * (x - less));
+        let with_line = less
+            .iter()
+            .zip(line)
+            .map(|(value, line)| value + line)
+            .collect();
+        let here = months
+            .iter()
+            .zip(values)
+            .filter(|(_, value)| !value.is_nan());
+        let has: BTreeSet<usize> = here.map(|(month, _)| *month).collect();
+        Self {
+            less,
+            with_line,
+            squared_years,
+            month_count: has.len(),
+        }
     }
-    // Of one value a month there is no line beside their means.
-    let slope = if across > 0.0 { along / across } else { 0.0 };
-    let line = years
-        .iter()
-        .zip(&less_years)
-        .map(|(x, less)| slope * (x - less));
-    less.iter()
-        .zip(line)
-        .map(|(value, line)| value + line)
-        .collect()
 }
 
 /// Mean of values; none of none.

@@ -5,12 +5,9 @@ use contract::analysis::CalendarBins;
 use contract::product::ProductId;
 use contract::time::{Period, TimeStep};
 
-use super::climatology::{less_their_months, months_of};
+use super::climatology::{less_their_months_exactly, months_of};
 use super::line::{Holes, Line};
 use super::timeline::{Bins, bins_over, longest_s, no_shorter};
-
-/// What is left of a value that is taken off from itself, as a share of the largest: rounding. Stored values have seven digits.
-const ROUNDING: f64 = 1e-12;
 
 /// What a series covers.
 #[derive(Debug, Clone, Copy)]
@@ -150,26 +147,11 @@ impl CommonSteps {
             let of_own = own.map(|place| place.map_or(f64::NAN, |place| means[place]));
             let mut common: Vec<f64> = of_own.collect();
             if let Some(months) = &self.months {
-                common = without_their_months(months, &common);
+                common = less_their_months_exactly(months, &common);
             }
             self.holes.spread(&common)
         })
     }
-}
-
-/// Values less the mean of their calendar month; of a season and nothing else nothing is left, not even rounding.
-fn without_their_months(months: &[usize], values: &[f64]) -> Vec<f64> {
-    let present = values.iter().filter(|value| !value.is_nan());
-    let largest = present.fold(0.0, |most: f64, value| most.max(value.abs()));
-    let left = |value: f64| {
-        if value.abs() <= ROUNDING * largest {
-            0.0
-        } else {
-            value
-        }
-    };
-    let less = less_their_months(months, values);
-    less.into_iter().map(left).collect()
 }
 
 /// All steps from the first of those that two series have in common to the last, of either and of none; `common` where they

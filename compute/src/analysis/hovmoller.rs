@@ -19,6 +19,7 @@ use super::read::Version;
 use super::timeline::{bins_over, no_shorter};
 use crate::ComputeError;
 use crate::step_range::step_range;
+use crate::summed::check_averaged;
 
 /// Means in one answer: 5 MiB as text.
 const MOST_MEANS: usize = 400_000;
@@ -38,6 +39,7 @@ pub fn hovmoller<'a>(
     query: &'a HovmollerQuery,
 ) -> BoxFuture<'a, Result<Hovmoller, ComputeError>> {
     Box::pin(async move {
+        check_averaged(manifest)?;
         let (_window, steps) = manifest.steps_inside(query.from, query.to)?;
         let grid = &manifest.grid;
         let band_deg = band_deg(grid, query)?;

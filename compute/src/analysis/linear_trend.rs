@@ -3,6 +3,7 @@
 use contract::analysis::LeastSquaresTrend;
 
 use super::autocorrelation::{autocorrelation, effective_count};
+use super::climatology::Seasonless;
 use super::distribution::{student_quantile, student_two_sided};
 
 /// Years in a decade.
@@ -12,8 +13,13 @@ const DECADE: f64 = 10.0;
 ///
 /// `years` are the times of the steps, `values` one beside each, NaN no data, any unit; steps at equal distances, for
 /// residuals are compared with their next ones. Effective number of values, and degrees of freedom two less: Santer et al.
-/// (2000), doi:10.1029/1999JD901105, equations 3 to 6.
-pub fn least_squares(years: &[f64], values: &[f64]) -> Option<LeastSquaresTrend> {
+/// (2000), doi:10.1029/1999JD901105, equations 3 to 6. Where means of months were found together with the line, so many effective values more
+/// are taken up, and times vary by what is left of them beside these.
+pub fn least_squares(
+    years: &[f64],
+    values: &[f64],
+    season: Option<&Seasonless>,
+) -> Option<LeastSquaresTrend> {
     let present = || years.iter().zip(values).filter(|(_, v)| !v.is_nan());
     let count = present().count();
     if count < 3 {
@@ -40,8 +46,10 @@ pub fn least_squares(years: &[f64], values: &[f64]) -> Option<LeastSquaresTrend>
         .sum();
     let r = autocorrelation(&residuals, 1);
     let effective = effective_count(count, r);
-    let freedom = effective - 2.0;
-    let error = (freedom > 0.0).then(|| (squares / freedom / xx).sqrt());
+    let means = season.map_or(1, |season| season.month_count.max(1));
+    let freedom = effective - 2.0 - (means - 1) as f64 * effective / n;
+    let known = season.map_or(xx, |season| season.squared_years);
+    let error = (freedom > 0.0 && known > 0.0).then(|| (squares / freedom / known).sqrt());
     let reach = error.zip(student_quantile(freedom)).map(|(e, q)| e * q);
     let p_value = error.and_then(|error| {
         if error > 0.0 {

@@ -152,7 +152,9 @@ fn shares_of_months(series: &ReadSeries) -> [f64; 12] {
     let mut shares = [0.0; 12];
     let here = series.periods.iter().zip(&series.values);
     for (period, _) in here.filter(|(_, value)| !value.is_nan()) {
-        shares[CalendarBins::Month.of(*period)] += period.seconds();
+        for part in TimeStep::Month.bins(*period, []).unwrap_or_default() {
+            shares[CalendarBins::Month.of(part)] += part.seconds();
+        }
     }
     let all: f64 = shares.iter().sum();
     shares.map(|own| own / all)

@@ -7,7 +7,7 @@ use contract::analysis::{
 };
 use contract::time::{Period, TimeMs, TimeStep};
 
-use super::climatology::{less_their_seasons, mean, months_of};
+use super::climatology::{Seasonless, mean, months_of};
 use super::extremes::percentile;
 use super::linear_trend::least_squares;
 use super::mann_kendall::{LEAST_VALUES, MOST_VALUES, mann_kendall};
@@ -82,7 +82,7 @@ impl TrendSteps {
             ..
         } = &basis;
         let (slopes, slope, test) = basis.tested(&self.years)?;
-        let (lower, upper) = slopes.interval(test.variance_correction);
+        let (lower, upper) = slopes.interval(test.variance_correction * basis.less_known());
         let constant = || basis.constant();
         let periods = self.bins.periods();
         let mid_years = mean(years_here).ok_or_else(constant)?;
@@ -106,7 +106,8 @@ impl TrendSteps {
             years: basis.spanned_years,
             mid: TimeMs::new(mid_ms).unwrap_or_else(|_| periods[0].mid()),
             mean: mean_of_all,
-            least_squares: least_squares(&self.years, of_basis).ok_or_else(constant)?,
+            least_squares: least_squares(&self.years, of_basis, basis.season.as_ref())
+                .ok_or_else(constant)?,
             theil_sen: TheilSenTrend {
                 slope_per_decade: slope * DECADE,
                 lower_per_decade: lower * DECADE,
@@ -140,7 +141,8 @@ impl TrendSteps {
         if basis.values_here.iter().all(is_first) {
             return Err(basis.constant());
         }
-        least_squares(&self.years, &basis.values).ok_or_else(|| basis.constant())
+        let found = least_squares(&self.years, &basis.values, basis.season.as_ref());
+        found.ok_or_else(|| basis.constant())
     }
 
     /// What slopes are sought in.
@@ -148,10 +150,21 @@ impl TrendSteps {
         let means = self.bins.means(values);
         let here: Vec<usize> = (0..means.len()).filter(|i| !means[*i].is_nan()).collect();
         let spanned_years = years_of(self.bins.periods(), &means, &here)?;
-        let values = match &self.months {
-            Some(months) => less_their_seasons(months, &self.years, &means),
-            None => means.clone(),
-        };
+        let months = self.months.as_ref();
+        let season = months.map(|months| Seasonless::of(months, &self.years, &means));
+        if let Some(season) = &season {
+            // Each month's own mean takes a value, and a line two.
+            let needed = season.month_count + 3;
+            if here.len() < needed {
+                return Err(Undefined::TooFew {
+                    what: "a trend beside a season",
+                    needed,
+                    found: here.len(),
+                });
+            }
+        }
+        let with_line = season.as_ref().map(|season| season.with_line.clone());
+        let values = with_line.unwrap_or_else(|| means.clone());
         let of_here = |all: &[f64]| -> Vec<f64> { here.iter().map(|i| all[*i]).collect() };
         Ok(Basis {
             years_here: of_here(&self.years),
@@ -159,6 +172,7 @@ impl TrendSteps {
             here,
             means,
             values,
+            season,
             spanned_years,
         })
     }
@@ -170,8 +184,10 @@ struct Basis {
     here: Vec<usize>,
     /// Of every bin, NaN no data.
     means: Vec<f64>,
-    /// The same, seasons off.
+    /// The same, seasons off, rising as they do.
     values: Vec<f64>,
+    /// What was taken off, and the same not rising by it; none where bins are longer than months.
+    season: Option<Seasonless>,
     /// Middles of the bins with data, years.
     years_here: Vec<f64>,
     /// Their values, seasons off.
@@ -195,7 +211,22 @@ impl Basis {
         let slope = slopes.median();
         let less = |(v, x): (&f64, &f64)| v - slope * x;
         let detrended: Vec<f64> = self.values.iter().zip(years).map(less).collect();
-        Ok((slopes, slope, mann_kendall(&self.values, &detrended)?))
+        // A line that was put back is one that noise has too: of what it was taken off from there is no more of it than chance has.
+        let tested = self
+            .season
+            .as_ref()
+            .map_or(&self.values, |season| &season.less);
+        Ok((slopes, slope, mann_kendall(tested, &detrended)?))
+    }
+
+    /// How many times as large the variance of a slope is as without means of months beside it.
+    fn less_known(&self) -> f64 {
+        let Some(season) = self.season.as_ref().filter(|own| own.squared_years > 0.0) else {
+            return 1.0;
+        };
+        let middle = mean(&self.years_here).unwrap_or_default();
+        let squares = self.years_here.iter().map(|x| (x - middle).powi(2));
+        squares.sum::<f64>() / season.squared_years
     }
 }
 

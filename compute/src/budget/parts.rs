@@ -41,7 +41,10 @@ pub(super) async fn add(
     check_inside(query, &together)?;
     let mut budgets = vec![];
     for part in parts {
-        budgets.push(budget(engine, query, manifest, part).await?);
+        let mut own = budget(engine, query, manifest, part).await?;
+        // What is said of the whole is said once.
+        own.notes.retain(|note| !answer.notes.contains(note));
+        budgets.push(own);
     }
     let union = AskedRegion {
         region: Region::Polygons(together),

@@ -12,7 +12,7 @@ use datafusion::logical_expr::expr::{Case, ScalarFunction};
 use datafusion::logical_expr::{Expr, ScalarUDF, lit};
 
 use super::function::Function;
-use super::typed::{PLACE_KEY, UNIT_KEY};
+use super::typed::UNIT_KEY;
 use super::udf::NumberFunction;
 use super::unit::Scaled;
 
@@ -58,10 +58,7 @@ fn with_unit(arguments: &[Expr]) -> Result<Expr> {
     let Some(scaled) = Scaled::parse(unit) else {
         return plan_err!("{unit:?} is no unit that is known here");
     };
-    let mut metadata = BTreeMap::from([(UNIT_KEY.to_owned(), scaled.unit.to_string())]);
-    if scaled.offset != 0.0 {
-        metadata.insert(PLACE_KEY.to_owned(), unit.clone());
-    }
+    let metadata = BTreeMap::from([(UNIT_KEY.to_owned(), scaled.unit.to_string())]);
     let si = value * scaled.factor + scaled.offset;
     Ok(Expr::Literal(
         ScalarValue::from(si),

@@ -83,23 +83,12 @@ pub(super) fn typed(expr: &Expr, units: &Units) -> Result<Typed, String> {
 
 /// Key of a literal's unit in what is told beside its value.
 pub(super) const UNIT_KEY: &str = "unit";
-/// The unit as it was written, where it counts from elsewhere than nothing.
-pub(super) const PLACE_KEY: &str = "place";
 
 fn unit_in(metadata: &BTreeMap<String, String>) -> Result<Unit, String> {
     let text = metadata.get(UNIT_KEY).map_or("1", String::as_str);
     super::unit::Scaled::parse(text)
         .map(|scaled| scaled.unit)
         .ok_or_else(|| format!("{text:?} is no unit"))
-}
-
-/// The unit of a number that counts from elsewhere than nothing: degrees Celsius.
-fn place(expr: &Expr) -> Option<&String> {
-    match expr {
-        Expr::Literal(_, Some(metadata)) => metadata.inner().get(PLACE_KEY),
-        Expr::Negative(inner) => place(inner),
-        _ => None,
-    }
 }
 
 fn truth(expr: &Expr, units: &Units) -> Result<Typed, String> {
@@ -116,14 +105,6 @@ fn of_binary(binary: &BinaryExpr, units: &Units) -> Result<Typed, String> {
     match binary.op {
         Operator::Plus | Operator::Minus => {
             let (left, right) = sides()?;
-            if binary.op == Operator::Plus
-                && let Some(unit) = place(&binary.left).or_else(|| place(&binary.right))
-            {
-                return Err(format!(
-                    "{}: a number in {unit} is a place on its scale, to which nothing is added; a difference is written in K: unit(0.17, 'K')",
-                    whole()
-                ));
-            }
             left.alike(right, whole)
         }
         Operator::Multiply | Operator::Divide => {

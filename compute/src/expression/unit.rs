@@ -117,12 +117,15 @@ impl Display for Unit {
 }
 
 impl Scaled {
-    /// The unit of stored values, one of SI or so many of one, as those of statistics: `K year-1`, `g m-2 year-1`, `day`; none if it begins
-    /// elsewhere.
+    /// The unit of stored values, one of SI or so many of one, as those of statistics: `K year-1`, `g m-2 year-1`, `day`. None if it begins
+    /// elsewhere, or is a part of one: a share in percent beside a number would be taken for the other.
     pub fn kept(text: &str) -> Option<Self> {
         let scaled = Self::parse(text).filter(|scaled| scaled.offset == 0.0)?;
         // A hair beside one is one: the bits of values stay.
         let is_one = (scaled.factor - 1.0).abs() < 1e-12;
+        if scaled.unit == Unit::ONE && !is_one {
+            return None;
+        }
         Some(Self {
             factor: if is_one { 1.0 } else { scaled.factor },
             ..scaled

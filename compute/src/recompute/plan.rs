@@ -15,6 +15,7 @@ use super::{Item, Plan, Reason, Request, What};
 use crate::budget::named::{self, Touching};
 use crate::budget::{Measure, sums};
 use crate::derive::{chosen_start, made_of};
+use crate::summed::check_summed;
 use crate::{ComputeError, catalogue};
 
 /// What a request comes to. Nothing is written.
@@ -39,6 +40,7 @@ pub fn plan<'a>(
                 What::Fields => fields(store, &manifest, window, request, &mut plan).await?,
                 What::Statistics => tables(store, &manifest, what, request, &mut plan).await?,
                 What::Budget if manifest.quantity == Quantity::CarbonFlux => {
+                    check_summed(store, &manifest).await?;
                     tables(store, &manifest, what, request, &mut plan).await?;
                 }
                 What::Budget => {
@@ -67,6 +69,7 @@ async fn fields(
             quantity: source.quantity,
         });
     }
+    check_summed(store, source).await?;
     plan.start = chosen_start(store, &source.product).await?;
     let target = source.product.accumulated()?;
     let latest = manifests::latest(store, &target).await?;

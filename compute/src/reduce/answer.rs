@@ -5,6 +5,7 @@ use std::ops::Range;
 
 use contract::cited::Cited;
 use contract::digest::Digest;
+use contract::geometry::{Geometry, Sampling};
 use contract::manifest::{Manifest, ManifestId};
 use contract::quantity::{Display, Quantity};
 use contract::statistics::{
@@ -23,6 +24,7 @@ use super::run::{changed_meanwhile, opened, run};
 use super::tasks::Version;
 use super::weighed::Weighed;
 use crate::budget::rows::coverage_percent;
+use crate::summed::check_averaged;
 use crate::{ComputeError, Engine, catalogue};
 
 /// Statistics of the newest version of a product.
@@ -44,6 +46,17 @@ pub fn statistics_of<'a>(
     id: ManifestId,
 ) -> BoxFuture<'a, Result<StatisticsAnswer, ComputeError>> {
     Box::pin(async move {
+        let counts = |one: Statistic| matches!(one, Statistic::Count | Statistic::Coverage);
+        let is_one_cell = matches!(
+            query.geometry,
+            Geometry::Point {
+                sampling: Sampling::Cell,
+                ..
+            }
+        );
+        if !is_one_cell && !query.statistics.iter().all(counts) {
+            check_averaged(manifest)?;
+        }
         let (window, inside) = manifest.steps_inside(query.from, query.to)?;
         let periods: Vec<Period> = manifest.steps.iter().map(|step| step.period).collect();
         let bins = query.step.bins(window, periods.iter().copied())?;

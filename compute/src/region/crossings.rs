@@ -7,7 +7,9 @@ const MOST: u64 = 250_000;
 /// Pairs of edges that are looked at, some tenths of a second.
 const LOOKS: u64 = 100_000_000;
 /// Edges of which every pair is looked at where there are too many pairs.
-const SAMPLE: usize = 4096;
+const SAMPLE: usize = 8192;
+/// Crossings among these that tell anything of all: one long edge crosses a coast some dozen times.
+const TELLING: u64 = 256;
 
 /// An edge from west to east, and its southern and northern ends.
 #[derive(Clone, Copy)]
@@ -72,7 +74,8 @@ fn has_more(mut edges: Vec<Edge>, pairs: u64) -> bool {
     let some: Vec<Edge> = some.copied().collect();
     let of_some = counted(&some, u64::MAX).unwrap_or(u64::MAX);
     let of_pairs = (some.len() as u64).pow(2) / 2;
-    u128::from(of_some) * u128::from(pairs) > u128::from(MOST) * u128::from(of_pairs)
+    of_some >= TELLING
+        && u128::from(of_some) * u128::from(pairs) > u128::from(MOST) * u128::from(of_pairs)
 }
 
 /// Crossings of edges in the order of their western ends, up to one more than [`MOST`]; none if more pairs would have to be looked at.

@@ -9,6 +9,7 @@ use crate::budget::Measure;
 use crate::budget::fixed::{AREA_DECIMALS, MASS_DECIMALS};
 use crate::budget::over_region::{AskedArea, over_region};
 use crate::budget::rows::{StepSum, coverage_percent};
+use crate::summed::check_averaged;
 use crate::{ComputeError, Engine, catalogue};
 
 /// The series of a product over a region.
@@ -29,6 +30,7 @@ pub fn region_series_of<'a>(
     manifest: &'a Manifest,
 ) -> BoxFuture<'a, Result<RegionSeries, ComputeError>> {
     Box::pin(async move {
+        check_averaged(manifest)?;
         let (_window, steps) = manifest.steps_inside(query.from, query.to)?;
         let area = AskedArea {
             region: &query.region,

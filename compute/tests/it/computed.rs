@@ -2,13 +2,14 @@
 //! is refused.
 
 use compute::computed::{Outcome, Request, RequestedInput, compute};
-use compute::{ComputeError, Engine, ErrorClass};
+use compute::{ComputeError, Engine, ErrorClass, point_series};
 use contract::computed::{Computation, Matching, Regridding};
 use contract::earth::Earth;
-use contract::grid::Grid;
+use contract::grid::{Grid, LonLatDeg};
 use contract::manifest::Manifest;
 use contract::quantity::Quantity;
-use contract::time::Period;
+use contract::statistics::StatisticsQuery;
+use contract::time::{Period, TimeStep};
 use storage::{Store, domain, fields, manifests};
 
 use crate::fixture::{ONE_DEGREE, folder_store, land, months, parts, product, wavy_year};
@@ -468,4 +469,36 @@ async fn what_was_computed_follows_its_inputs_and_what_follows_it() {
             .into_iter()
             .all(|(one, two)| (2.0 * one - two).abs() <= f32::EPSILON * two.abs())
     );
+}
+
+/// No step holds data, so that the array along time has no chunk at all.
+#[tokio::test(flavor = "multi_thread")]
+async fn steps_without_data_are_answered_as_such() {
+    let (_folder, store) = folder_store();
+    land_inputs(&store).await;
+    let engine = Engine::in_process(store.clone(), parts(2));
+    let made = computed(&engine, &asked("wind / 0", &["wind"]))
+        .await
+        .manifest;
+    assert!(made.steps.iter().all(|step| step.valid_cells == 0));
+    // Whoever publishes has it made behind.
+    cube::compact(&store, "cubes/windy").await.unwrap();
+    let values = cube::Values::of(&store, &std::sync::Arc::new(made.clone())).await;
+    assert_eq!(values.unwrap().in_fields_count(), 0, "it is along time");
+    let place = LonLatDeg::new(5.0, 5.0).unwrap();
+    let found = point_series(&engine, &made.product, place).await.unwrap();
+    assert_eq!(found.series.len(), made.steps.len());
+    assert!(found.series.iter().all(|row| row.value.is_none()));
+    let query = StatisticsQuery {
+        product: made.product.clone(),
+        ..crate::statistics::asked(
+            crate::statistics::area("-40,-20,-10,10"),
+            "mean,count",
+            TimeStep::Native,
+        )
+    };
+    let answer = compute::reduce::statistics(&engine, &query).await.unwrap();
+    for row in answer.rows {
+        assert_eq!((row.values["mean"], row.values["count"]), (None, Some(0.0)));
+    }
 }

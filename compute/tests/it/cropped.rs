@@ -4,9 +4,11 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use compute::Engine;
+use compute::computed::{Request, RequestedInput, compute};
 use compute::derive::{derive_statistic, derive_statistics};
 use contract::analysis::{MapOptions, MapStatistic};
 use contract::chunk::Window;
+use contract::computed::{Computation, Matching};
 use contract::grid::Grid;
 use contract::manifest::Manifest;
 use contract::quantity::Quantity;
@@ -189,21 +191,41 @@ async fn what_others_are_made_of_keeps_its_grid() {
         derive_statistic(&engine, &product("wind"), options, &|_| ()).await
     };
     let whole = derived("12,-28,33,11", false).await.unwrap();
+    // Statistics of it follow to any grid.
     let spread = MapOptions {
         name: Some(product("spread-here")),
         ..MapOptions::new(MapStatistic::Spread)
     };
     let spread = derive_statistic(&engine, &whole.product, &spread, &|_| ()).await;
     spread.unwrap();
+    assert_eq!(derived("12,-28,33,11", true).await.unwrap().number, 2);
+    assert_eq!(derived("12,-28,33,11", false).await.unwrap().number, 3);
+    let twice = Request {
+        target: product("twice-here"),
+        title: None,
+        quantity: Some(whole.quantity),
+        how: Computation::Expression {
+            expression: "a * 2".to_owned(),
+        },
+        grid: None,
+        inputs: vec![RequestedInput {
+            name: "a".to_owned(),
+            product: whole.product.clone(),
+            matching: Matching::SamePeriod,
+        }],
+        from: None,
+        to: None,
+    };
+    compute(&engine, &twice, &|_| ()).await.unwrap();
     let refused = derived("12,-28,33,11", true).await.unwrap_err().to_string();
     for part in [
         "36 x 72 cells",
         "16 x 16",
-        "spread-here is made of it",
+        "twice-here is made of it",
         "give another name",
     ] {
         assert!(refused.contains(part), "{refused}");
     }
     // Another region on the same grid is another version of it.
-    assert_eq!(derived("-60,-28,33,11", false).await.unwrap().number, 2);
+    assert_eq!(derived("-60,-28,33,11", false).await.unwrap().number, 4);
 }

@@ -14,7 +14,7 @@ use contract::time::{Period, TimeStep};
 use storage::{Store, domain, fields};
 
 use crate::fixture::{folder_store, land, parts, product};
-use crate::statistics::asked;
+use crate::statistics::{area, asked};
 
 /// Blocks that are cut at both edges.
 const GRID: Grid = Grid {
@@ -698,4 +698,42 @@ async fn chances_are_those_of_the_test_that_is_asked_for() {
         telling += u32::from((right[0] - right[1]).abs() > 1e-3);
     }
     assert!(compared > 50 && telling > 10, "{compared} {telling}");
+}
+
+/// The mean of 1 January and 31 December is no day of July.
+#[tokio::test(flavor = "multi_thread")]
+async fn days_of_the_year_are_not_averaged() {
+    let (_folder, store) = folder_store();
+    landed(&store).await;
+    let engine = Engine::in_process(store.clone(), parts(2));
+    let phase = derived(&engine, &MapOptions::new(MapStatistic::Phase)).await;
+    let phase = phase.unwrap();
+    let of = |geometry: AskedGeometry, statistics: &str| StatisticsQuery {
+        product: phase.product.clone(),
+        ..asked(geometry, statistics, TimeStep::Native)
+    };
+    let place = LonLatDeg::new(-20.5, 30.5).unwrap();
+    let over = || area("-25,25,-10,35");
+    for (query, is_told) in [
+        (of(over(), "mean"), false),
+        (of(over(), "count,max"), false),
+        (
+            of(AskedGeometry::point(place, Sampling::Bilinear), "mean"),
+            false,
+        ),
+        (
+            of(AskedGeometry::point(place, Sampling::Cell), "mean"),
+            true,
+        ),
+        (of(over(), "count,coverage"), true),
+    ] {
+        let found = statistics_of_newest(&engine, &query).await;
+        match found {
+            Ok(_) => assert!(is_told, "{query:?}"),
+            Err(error) => {
+                assert!(!is_told, "{error}");
+                assert!(error.to_string().contains("go round"), "{error}");
+            }
+        }
+    }
 }

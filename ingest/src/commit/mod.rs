@@ -46,10 +46,13 @@ pub(crate) async fn run(
     claims: &[Claim],
 ) -> Result<Vec<Answer>, IngestError> {
     let mut all = Vec::with_capacity(granules.len());
+    // What one of them has there already, those before it leave.
+    let own = granules.iter().map(Claim::of_granule);
+    let claims: Vec<Claim> = claims.iter().cloned().chain(own).collect();
     let mut rest = granules;
     while !rest.is_empty() {
         let (group, later) = rest.split_at(merge::disjoint_prefix(rest));
-        all.extend(publish(store, group, claims).await?);
+        all.extend(publish(store, group, &claims).await?);
         rest = later;
     }
     Ok(all)

@@ -7,6 +7,7 @@ use std::future::Future;
 use std::sync::Arc;
 use std::time::Duration;
 
+use contract::digest::Digest;
 use contract::product::ProductId;
 use contract::topic::Origin;
 use futures::FutureExt as _;
@@ -69,12 +70,12 @@ struct Shift<'a> {
     next: Number,
     work: Work<'a>,
     ended: Vec<Ended>,
-    /// Files that are there, whose notices files before them must not pass by.
-    claims: Vec<(Number, Claim)>,
+    /// Files that are there, by product and content, whose place files that were offered before them do not take.
+    claims: BTreeMap<(ProductId, Digest), Claim>,
     /// The newest version of each product that was published here.
     published: BTreeMap<ProductId, u64>,
-    /// Files to be read again once their product is not being published: they were there before.
-    again: Vec<(Number, ProductId)>,
+    /// Files to be looked at again once their product is not being published: they were there before.
+    again: Vec<(Number, Claim, Answer)>,
     /// Messages of which everything is answered.
     finished: BTreeMap<Number, Open>,
     /// What became of the files of a command, in the order of their notices.
@@ -105,7 +106,7 @@ pub(super) async fn run(
         next: 0,
         work: Work::new(),
         ended: Vec::new(),
-        claims: Vec::new(),
+        claims: BTreeMap::new(),
         published: BTreeMap::new(),
         again: Vec::new(),
         finished: BTreeMap::new(),
@@ -115,7 +116,7 @@ pub(super) async fn run(
     loop {
         shift.settle()?;
         shift.give_up(&reader.lost());
-        shift.read_again();
+        shift.look_again();
         shift.publish();
         shift.finish(reader.as_mut()).await?;
         if last_call.is_none() && stop.clone().now_or_never().is_some() {
@@ -145,7 +146,7 @@ pub(super) async fn run(
     }
 }
 
-impl Shift<'_> {
+impl<'a> Shift<'a> {
     /// How many further messages may be taken. Those that wait for a source that is slow or away take no place from others,
     /// as long as they are not very many.
     fn room(&self) -> usize {
@@ -215,10 +216,19 @@ impl Shift<'_> {
 
     /// Begins to take a file as far as to the manifest.
     fn prepare(&mut self, job: Number, notice: &Arc<PendingNotice>) -> AbortHandle {
-        let origin = notice.origin;
-        let span = tracing::info_span!("notice", trace = notice.cause.trace, %origin);
         let by = (self.caller, &self.service.health);
         let work = work::prepare(self.pipeline, by, job, Arc::clone(notice));
+        self.push(notice, work)
+    }
+
+    /// Work on a file that can be ended.
+    fn push(
+        &mut self,
+        notice: &PendingNotice,
+        work: impl Future<Output = Ended> + Send + 'a,
+    ) -> AbortHandle {
+        let origin = notice.origin;
+        let span = tracing::info_span!("notice", trace = notice.cause.trace, %origin);
         let (prepare, registration) = AbortHandle::new_pair();
         let work = Abortable::new(work.instrument(span), registration);
         let work = work.map(|ended| ended.unwrap_or(Ok(Done::GivenUp)));
@@ -226,43 +236,56 @@ impl Shift<'_> {
         prepare
     }
 
-    /// Reads files again that were there in a version that others were published over meanwhile.
-    fn read_again(&mut self) {
+    /// Looks again at files that were there in a version that others were published over meanwhile.
+    fn look_again(&mut self) {
         let queue = &self.publish_queue;
         let free = self
             .again
-            .extract_if(.., |(_, product)| !queue.is_busy(product));
-        for (number, _) in free.collect::<Vec<_>>() {
+            .extract_if(.., |(_, claim, _)| !queue.is_busy(&claim.product));
+        for (number, mut claim, answer) in free.collect::<Vec<_>>() {
             let Some(notice) = self.jobs.get(&number).map(|job| Arc::clone(&job.notice)) else {
                 continue;
             };
-            let prepare = self.prepare(number, &notice);
+            // It is compared with what there is now.
+            let published = self.published.get(&claim.product).copied();
+            claim.version = published.unwrap_or_default().max(claim.version);
+            let by = (self.caller, &self.service.health);
+            let file = (number, Arc::clone(&notice));
+            let work = work::prepare_again(self.pipeline, by, file, (claim, answer));
+            let prepare = self.push(&notice, work);
             if let Some(job) = self.jobs.get_mut(&number) {
                 job.prepare = prepare;
             }
         }
     }
 
-    /// All of a file is in a version of its product.
+    /// A file changes nothing in a version of its product.
     fn there(&mut self, number: Number, claim: Claim, answer: Answer) {
+        if !self.jobs.contains_key(&number) {
+            return;
+        }
         let published = self.published.get(&claim.product);
         if self.publish_queue.is_busy(&claim.product)
             || published.is_some_and(|newest| *newest > claim.version)
         {
-            self.again.push((number, claim.product));
+            self.again.push((number, claim, answer));
             return;
         }
-        self.claims.push((number, claim));
+        let of = (claim.product.clone(), claim.raw_sha256);
+        let before = self.claims.get(&of).map(|before| before.place);
+        if before.is_none_or(|before| before < claim.place) {
+            self.claims.insert(of, claim);
+        }
         self.answered(number, answer);
     }
 
-    /// What files claim that are there, as long as others that came before them are on their way.
+    /// What files claim that are there, as long as others that were offered before them are on their way.
     fn claims_of(&self, product: &ProductId) -> Vec<Claim> {
         let of_it = self
             .claims
-            .iter()
-            .filter(|(_, claim)| claim.product == *product);
-        of_it.map(|(_, claim)| claim.clone()).collect()
+            .values()
+            .filter(|claim| claim.product == *product);
+        of_it.cloned().collect()
     }
 
     /// Ends what is under way for messages that another member has now: it does all of it again. What is being published
@@ -342,9 +365,12 @@ impl Shift<'_> {
         let Some(job) = self.jobs.remove(&number) else {
             return;
         };
-        let first = self.jobs.keys().next().copied();
-        self.claims
-            .retain(|(claimed, _)| first.is_some_and(|first| first < *claimed));
+        if !self.claims.is_empty() {
+            let places = self.jobs.values().map(|job| job.notice.place);
+            let first = places.min();
+            self.claims
+                .retain(|_, claim| first.is_some_and(|first| first < claim.place));
+        }
         let Some(open) = self.open.get_mut(&job.message) else {
             return;
         };

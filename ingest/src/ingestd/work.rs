@@ -60,6 +60,22 @@ pub(super) async fn prepare(
     Ok(Done::Prepared(number, Box::new(prepared)))
 }
 
+/// Looks whether a file that was there is there still, since others were published; else takes it as far as to the manifest.
+pub(super) async fn prepare_again(
+    pipeline: Pipeline<'_>,
+    by: (Caller, &Health),
+    (number, notice): (Number, Arc<PendingNotice>),
+    (claim, answer): (Claim, Answer),
+) -> Ended {
+    match retry(by, "prepare", || pipeline.is_still_there(&claim)).await {
+        Ok(true) => Ok(Done::Prepared(
+            number,
+            Box::new(Prepared::There(claim, answer)),
+        )),
+        Ok(false) | Err(_) => prepare(pipeline, by, number, notice).await,
+    }
+}
+
 /// Publishes files of one product together; if that fails because of one of them, one by one.
 pub(super) async fn publish(
     pipeline: Pipeline<'_>,

@@ -41,9 +41,9 @@ const TEXT_HEAD_BYTES: usize = 256 << 10;
 pub(crate) enum Prepared {
     /// To publish, with others of its product.
     ToCommit(StoredGranule),
-    /// Nothing is to be published: it is refused, came too late, or held observations, which are stored.
+    /// Nothing is to be published: it is refused, or held observations, which are stored.
     Answered(Answer),
-    /// All of it is there. Files that were offered before it may still be on their way.
+    /// It is there, as far as no later files have its time. Files that were offered before it may still be on their way.
     There(Claim, Answer),
 }
 
@@ -174,14 +174,8 @@ impl Pipeline<'_> {
             // What is stored of it is compared, and replaced if it is damaged.
             raw.await?;
             let claim = Claim::of(&unchanged.0, way.notice.place);
-            let is_there = matches!(unchanged.1, Unchanged::Same(_));
             let answer = commit::answer_unchanged(self.store, way.notice, unchanged, None);
-            let answer = answer.await?;
-            return Ok(if is_there {
-                Prepared::There(claim, answer)
-            } else {
-                Prepared::Answered(answer)
-            });
+            return Ok(Prepared::There(claim, answer.await?));
         }
         let _pass = seat
             .with_memory(memory::of_grids(&planned, &self.settings.limits))
@@ -214,6 +208,13 @@ impl Pipeline<'_> {
     ) -> Result<Option<Manifest>, IngestError> {
         let newest = manifests::latest(self.store, &planned.plan.target.product).await;
         newest.map_err(IngestError::storage("read the newest manifest"))
+    }
+
+    /// Does a file that was there still change nothing?
+    pub(crate) async fn is_still_there(&self, claim: &Claim) -> Result<bool, IngestError> {
+        let newest = manifests::latest(self.store, &claim.product).await;
+        let newest = newest.map_err(IngestError::storage("read the newest manifest"))?;
+        Ok(newest.is_some_and(|newest| claim.holds(&newest)))
     }
 
     /// Refuses a file of a product whose values lie elsewhere.

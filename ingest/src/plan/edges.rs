@@ -43,7 +43,8 @@ pub(super) async fn middles(
         ));
         return Ok(labels);
     };
-    let packing = Packing::of(held);
+    // What is valid is said of labels, and edges may lie beyond.
+    let packing = Packing::of(held).with_valid_values(f64::NEG_INFINITY, f64::INFINITY);
     let stored = planning
         .values
         .read(&bounds, &[Part::All, Part::All], count * 2);
@@ -84,7 +85,11 @@ fn otherwise(labels: &[f64], edges: &[[f64; 2]], along: Along) -> Result<Option<
         // Refused by their labels.
         return Ok(None);
     }
-    let tolerance = TOLERANCE_CELLS * cell;
+    let farthest = edges
+        .iter()
+        .flatten()
+        .fold(0.0, |most: f64, edge| most.max(edge.abs()));
+    let tolerance = TOLERANCE_CELLS * cell + 2.0 * f64::from(f32::EPSILON) * farthest;
     let near = |one: f64, other: f64| (one - other).abs() <= tolerance;
     let mut middles = Vec::with_capacity(labels.len());
     let (mut is_of_labels, mut odd) = (true, None);

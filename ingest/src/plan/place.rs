@@ -258,7 +258,7 @@ async fn read_mapping(
             check_evidence(planning, name, labels, most_deg)?;
         }
     }
-    let (lat_deg, lon_deg) = if planning.profile.is_none() {
+    let (lat_deg, lon_deg) = if rules.registration.is_none() {
         (
             edges::middles(planning, (&names[0], lat_deg), Along::Latitude).await?,
             edges::middles(planning, (&names[1], lon_deg), Along::Longitude).await?,
@@ -283,10 +283,10 @@ fn registration(
     [lat_deg, lon_deg]: [&[f64]; 2],
 ) -> Registration {
     if planning.profile.is_some() {
-        return rules.registration;
+        return rules.registration.unwrap_or_default();
     }
     let Some(corner) = corner::of(lat_deg, lon_deg) else {
-        return rules.registration;
+        return rules.registration.unwrap_or_default();
     };
     planning.assume(format!(
         "{} and {}: as centres of cells their labels would reach past a pole; they are taken for corners ({corner:?}) of cells that cover the globe",

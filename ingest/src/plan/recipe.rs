@@ -11,7 +11,8 @@ use crate::plan::profile::Profile;
 ///
 /// 2: masked cells are counted, valid ranges are read as CF says.
 /// 3: fugacity is told from partial pressure, and temperatures of the sea surface by their depth.
-pub(crate) const DECODER: u32 = 3;
+/// 4: cells lie where the bounds of axes say, and extremes and spreads over time are not taken for the quantity.
+pub(crate) const DECODER: u32 = 4;
 
 /// How a file was read.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]

@@ -619,3 +619,30 @@ async fn clean_up_and_checks_know_references() {
     );
     assert_eq!(Digest::of(b"").to_string().len(), 64);
 }
+
+/// What one store holds says nothing of another that is to hold the same.
+#[tokio::test]
+async fn a_store_that_is_damaged_is_not_vouched_for_by_another() {
+    let own = Own::with("v2-plain.zarr");
+    own.attach().await.unwrap();
+    let twin = own.folder.path().join("twin.zarr");
+    copy(&own.path(), &twin);
+    let mut request = request(twin.to_str().unwrap(), "sst");
+    request.product = Some("twin".parse().unwrap());
+    own.ask(&request).await.unwrap();
+    std::fs::remove_file(twin.join("sst/0.0.0")).unwrap();
+    let changed = readable(&own.store.bare());
+    let newest = async |product: &str| {
+        let product = product.parse().unwrap();
+        let newest = storage::manifests::latest(&changed, &product).await;
+        newest.unwrap().unwrap()
+    };
+    let (first, second) = (newest("sst").await, newest("twin").await);
+    let read = |of: Manifest| {
+        let changed = changed.clone();
+        async move { fields::read(&changed, &of.steps[0].field, &of.grid).await }
+    };
+    read(first).await.unwrap();
+    let error = read(second).await.unwrap_err().to_string();
+    assert!(error.contains("twin.zarr"), "{error}");
+}

@@ -223,3 +223,96 @@ async fn latitudes_that_say_so_land_without_a_note_about_them() {
         "{said:?}"
     );
 }
+
+/// Two numbers a cell.
+fn bounds(name: &'static str, axis: &'static str, edges: &[[f64; 2]]) -> Made {
+    Made::new(
+        name,
+        &[axis, "two"],
+        Values::Doubles(edges.as_flattened().to_vec()),
+    )
+}
+
+/// Labels name corners of cells, and bounds say so; others are no cells side by side.
+#[tokio::test]
+async fn labels_at_corners_with_bounds_land_where_these_say() {
+    let file = || {
+        let file = MadeFile::sst(2);
+        let named = |name: &'static str| move |v: Made| v.text("bounds", name);
+        file.but("lat", named("lat_bnds"))
+            .but("lon", named("lon_bnds"))
+    };
+    let axes = file();
+    let labels = |name: &str| {
+        let variable = axes.variables.iter().find(|v| v.name == name).unwrap();
+        match &variable.values {
+            Values::Doubles(values) => values.clone(),
+            _ => panic!("{name} is of doubles"),
+        }
+    };
+    let (lat, lon) = (labels("lat"), labels("lon"));
+    let step = |labels: &[f64]| labels[1] - labels[0];
+    let from = |labels: &[f64], low: f64, high: f64| -> Vec<[f64; 2]> {
+        let cell = step(labels).abs();
+        labels
+            .iter()
+            .map(|label| [label + low * cell, label + high * cell])
+            .collect()
+    };
+    let landed = async |lat_edges: Vec<[f64; 2]>, lon_edges: Vec<[f64; 2]>| {
+        let file = file()
+            .with(bounds("lat_bnds", "lat", &lat_edges))
+            .with(bounds("lon_bnds", "lon", &lon_edges));
+        let place = Place::new();
+        file.write(&place.path("a.nc"));
+        let outcome = place.land(&[place.path("a.nc")]).await.remove(0);
+        (place, outcome)
+    };
+    let (place, outcome) = landed(from(&lat, -0.5, 0.5), from(&lon, -0.5, 0.5)).await;
+    assert!(
+        assumed(&outcome).iter().all(|line| !line.contains("bnds")),
+        "{outcome}"
+    );
+    let Outcome::Landed { manifest, .. } = &outcome else {
+        panic!("{outcome}")
+    };
+    let middle = place.newest(manifest.product.as_str()).await.grid;
+    // North-eastern corners are the labels.
+    let (place, outcome) = landed(from(&lat, -1.0, 0.0), from(&lon, -1.0, 0.0)).await;
+    let told = assumed(&outcome);
+    for name in ["lat_bnds", "lon_bnds"] {
+        assert!(told.iter().any(|line| line.contains(name)), "{told:?}");
+    }
+    let corner = place.newest(manifest.product.as_str()).await.grid;
+    assert_eq!((corner.rows, corner.cols), (middle.rows, middle.cols));
+    assert_eq!(corner.north_deg, middle.north_deg - middle.dlat_deg / 2.0);
+    assert_eq!(corner.west_deg, middle.west_deg - middle.dlon_deg / 2.0);
+    let (_place, outcome) = landed(from(&lat, -0.1, 0.1), from(&lon, -0.5, 0.5)).await;
+    let (reason, line) = refusal(&[outcome]);
+    assert!(
+        reason == RejectReason::Grid && line.contains("no cells side by side"),
+        "{line}"
+    );
+}
+
+/// Plain HDF5 names no dimensions.
+#[tokio::test]
+async fn axes_without_names_are_told_by_length_or_refused() {
+    let place = Place::new();
+    crate::fixture::SmallFile::new().write_hdf5(&place.path("a.h5"));
+    let outcome = place.land(&[place.path("a.h5")]).await.remove(0);
+    let told = assumed(&outcome);
+    assert!(
+        told.iter().any(|line| line.contains("names no dimensions")),
+        "{told:?}"
+    );
+    let mut square = crate::fixture::SmallFile::new();
+    square.lat = (0..8).map(|row| 70.0 - 20.0 * f64::from(row)).collect();
+    square.values = vec![1.0; 2 * 8 * 8];
+    square.write_hdf5(&place.path("square.h5"));
+    let (reason, line) = refusal(&place.land(&[place.path("square.h5")]).await);
+    assert!(
+        reason == RejectReason::Grid && line.contains("of one length"),
+        "{line}"
+    );
+}

@@ -64,6 +64,53 @@ fn a_line_under_a_season_is_found_as_it_is() {
     }
 }
 
+/// Noise has no trend, however many values are missing: about as often one by chance as it says.
+#[test]
+fn noise_has_trends_as_often_as_chance_says() {
+    let mut state = 11_u64;
+    let mut next = || {
+        state = state.wrapping_mul(25_214_903_917).wrapping_add(11) & ((1 << 48) - 1);
+        state as f64 / (1_u64 << 48) as f64
+    };
+    for (count, kept) in [(60, 1.0), (60, 0.4), (120, 0.5), (240, 0.12)] {
+        let periods = months(count);
+        let steps = TrendSteps::of(&periods, TimeStep::Month);
+        let (mut tested, mut by_rank, mut by_squares) = (0, 0, 0);
+        for _ in 0..400 {
+            let mut value = || {
+                let noise: f64 = (0..12).map(|_| next()).sum();
+                if next() <= kept { noise } else { f64::NAN }
+            };
+            let values: Vec<f64> = (0..count).map(|_| value()).collect();
+            let Ok(found) = steps.trend(&values, "") else {
+                continue;
+            };
+            tested += 1;
+            by_rank += u32::from(found.mann_kendall.p_value < 0.05);
+            by_squares += u32::from(found.least_squares.p_value.is_some_and(|p| p < 0.05));
+        }
+        assert!(tested > 100, "{count} {kept}: {tested}");
+        let most = tested / 8;
+        assert!(
+            by_rank < most && by_squares < most,
+            "{count} {kept}: {by_rank} {by_squares} of {tested}"
+        );
+        assert!(
+            by_rank > tested / 100,
+            "{count} {kept}: {by_rank} of {tested}"
+        );
+    }
+    // Thirteen values in twelve months lie on a line whatever they are.
+    let few: Vec<f64> = (0..60)
+        .map(|m| if m < 12 || m == 59 { next() } else { f64::NAN })
+        .collect();
+    let refused = trend(&months(60), &few, TimeStep::Month, "").unwrap_err();
+    assert_eq!(
+        refused.to_string(),
+        "a trend beside a season needs 15 values, and there are 13"
+    );
+}
+
 #[test]
 fn steps_longer_than_months_are_taken_as_they_are() {
     let years: Vec<Period> = (0..30).map(|y| Period::year(1980 + y).unwrap()).collect();

@@ -219,7 +219,8 @@ pub(super) type Placed = (Step, Option<NoticeOrder>);
 enum Act {
     Insert,
     Replace(usize),
-    Keep,
+    /// It is there, maybe by an earlier notice of the same file.
+    Keep(usize),
     /// A file of a later notice has its period.
     Leave,
 }
@@ -257,7 +258,7 @@ fn add(placed: &mut Vec<Placed>, granule: &StoredGranule) -> Change {
                 placed[index] = new();
                 revised = true;
             }
-            Act::Keep => {}
+            Act::Keep(index) => placed[index].1 = placed[index].1.max(Some(order)),
             Act::Leave => continue,
         }
         periods.push(step.period);
@@ -281,7 +282,7 @@ fn act(placed: &[Placed], new: &Step, order: NoticeOrder) -> Result<Act, Period>
         return Err(there.period);
     }
     Ok(if is_same_source(there, new) {
-        Act::Keep
+        Act::Keep(first)
     } else if is_later_or_same(*there_order, order) {
         Act::Leave
     } else {

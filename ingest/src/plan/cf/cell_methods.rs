@@ -42,6 +42,7 @@ pub(crate) fn all_of_time(text: &str, time: &str) -> Vec<Vec<String>> {
         }
         let mut said = vec![];
         while let Some(word) = words.next_if(|word| !word.ends_with(':')) {
+            let word = word.trim_end_matches([',', ';', '.']);
             said.push(word.to_ascii_lowercase());
         }
         if is_time && !said.is_empty() {

@@ -112,8 +112,7 @@ pub(crate) struct QualityRules {
 #[derive(Debug, Clone, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct GridRules {
-    #[serde(default)]
-    pub(crate) registration: Registration,
+    pub(crate) registration: Option<Registration>,
     /// Names of the coordinate variables.
     pub(crate) latitude: Option<String>,
     pub(crate) longitude: Option<String>,
