@@ -93,8 +93,10 @@ async fn recipes(store: &Store) -> Result<BTreeMap<ProductId, Recipe>, ComputeEr
         let Some(latest) = newest(store, &product).await? else {
             continue;
         };
+        // Of one whose inputs cannot be read nothing is accumulated, and all others can be made.
+        let is_accumulated = is_accumulated(store, &latest).await;
         if let Ok(target) = product.accumulated()
-            && is_accumulated(store, &latest).await?
+            && told(&product, is_accumulated)?.unwrap_or(false)
         {
             recipes.insert(target, Recipe::Accumulated(product.clone()));
         }

@@ -1,5 +1,7 @@
 //! What may be summed over area and time, a flux of carbon and no extreme of one; and what may be averaged, no days of a year that goes round.
 
+use std::collections::BTreeSet;
+
 use contract::ContractError;
 use contract::analysis::MapStatistic;
 use contract::computed::Computation;
@@ -29,7 +31,7 @@ pub async fn has_budget(store: &Store, manifest: &Manifest) -> Result<bool, Comp
 /// `NotSummed` of the highest or lowest values or a percentile of each cell, and of these on another grid or averaged: cells of which each has
 /// its value from another time were never there together.
 pub(crate) async fn check_summed(store: &Store, manifest: &Manifest) -> Result<(), ComputeError> {
-    let mut source = None;
+    let (mut source, mut seen) = (None, BTreeSet::from([manifest.product.clone()]));
     loop {
         let own = source.as_ref().unwrap_or(manifest);
         let Some(computed) = &own.computed else {
@@ -61,7 +63,7 @@ pub(crate) async fn check_summed(store: &Store, manifest: &Manifest) -> Result<(
                     Err(error) => return Err(error.into()),
                 };
                 match found {
-                    Some(found) if found.product != manifest.product => source = Some(found),
+                    Some(found) if seen.insert(found.product.clone()) => source = Some(found),
                     _ => return Ok(()),
                 }
             }

@@ -219,14 +219,17 @@ impl Basis {
         Ok((slopes, slope, mann_kendall(tested, &detrended)?))
     }
 
-    /// How many times as large the variance of a slope is as without means of months beside it.
+    /// How many times as large the variance of a slope is as without means of months beside it: times vary by less beside them, and each takes a
+    /// part of the scatter.
     fn less_known(&self) -> f64 {
         let Some(season) = self.season.as_ref().filter(|own| own.squared_years > 0.0) else {
             return 1.0;
         };
         let middle = mean(&self.years_here).unwrap_or_default();
         let squares = self.years_here.iter().map(|x| (x - middle).powi(2));
-        squares.sum::<f64>() / season.squared_years
+        let count = self.values_here.len() as f64;
+        let scatter = (count - 2.0) / (count - season.month_count as f64 - 1.0);
+        squares.sum::<f64>() / season.squared_years * scatter
     }
 }
 

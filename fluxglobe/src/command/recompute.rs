@@ -97,9 +97,11 @@ async fn cubes(store: &Store, product: &ProductId) -> Result<()> {
 /// alone, and a budget is refused where nothing else is asked for.
 async fn plan(settings: &Settings, store: &Store, options: &Recompute) -> Result<Plan> {
     let manifest = deployment::manifest(store, &options.product, &settings.data).await?;
-    let is_flux = compute::has_budget(store, &manifest).await?;
-    let is_asked_alone = options.what.len() == 1;
+    let is_of_flux = |what: &What| matches!(what, What::Fields | What::Budget);
     let computed = options.what.iter().filter_map(|what| what.computed());
+    let is_flux = computed.clone().any(|what| is_of_flux(&what))
+        && compute::has_budget(store, &manifest).await?;
+    let is_asked_alone = options.what.len() == 1;
     let request = Request {
         product: options.product.clone(),
         from: options.from,

@@ -4,6 +4,8 @@
 //! Claims of files that are there are kept by the process that read them, as long as files that were offered before are on their way; the next version
 //! of the product keeps them for all.
 
+use std::collections::BTreeSet;
+
 use contract::digest::Digest;
 use contract::key::ObjectKey;
 use contract::manifest::Manifest;
@@ -21,13 +23,22 @@ pub(crate) struct Claim {
     pub(crate) product: ProductId,
     /// The version that it was compared with.
     pub(crate) version: u64,
-    pub(crate) raw_sha256: Digest,
+    raw_sha256: Digest,
     /// What it has a value for; with the field, if it was read anew.
     steps: Vec<(Period, Option<ObjectKey>)>,
     pub(crate) place: NoticeOrder,
 }
 
+/// Whose claim it is: product, content, and the first step, for one content may be read as different steps by its name.
+pub(crate) type ClaimName = (ProductId, Digest, Option<Period>);
+
 impl Claim {
+    /// Tells it from those of other files.
+    pub(crate) fn name(&self) -> ClaimName {
+        let first = self.steps.first().map(|(period, _)| *period);
+        (self.product.clone(), self.raw_sha256, first)
+    }
+
     /// That of a file that changes nothing in a version.
     pub(crate) fn of(there: &Versioned, place: NoticeOrder) -> Self {
         Self {
@@ -40,7 +51,7 @@ impl Claim {
     }
 
     /// That of a file that is about to be published.
-    pub(super) fn of_granule(granule: &StoredGranule) -> Self {
+    pub(crate) fn of_granule(granule: &StoredGranule) -> Self {
         let step = |step: &contract::manifest::Step| (step.period, Some(step.field.clone()));
         Self {
             product: granule.product.clone(),
@@ -75,7 +86,7 @@ impl Claim {
     /// Does the file change nothing in a newer version either?
     pub(crate) fn holds(&self, newest: &Manifest) -> bool {
         let orders = newest.notice_orders();
-        let own: Vec<usize> = self.own(newest).collect();
+        let own: BTreeSet<usize> = self.own(newest).collect();
         self.steps.iter().all(|(period, _)| {
             newest.step_of(*period).is_some_and(|index| {
                 own.contains(&index) || is_later_or_same(orders[index], self.place)

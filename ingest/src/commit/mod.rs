@@ -24,7 +24,7 @@ use crate::put::StoredGranule;
 use extent::Valued;
 use merge::{Change, Merged};
 
-pub(crate) use claim::Claim;
+pub(crate) use claim::{Claim, ClaimName};
 pub(crate) use extent::FIELDS_AT_ONCE;
 pub(crate) use extent::write as domain;
 pub(crate) use mend::mend;

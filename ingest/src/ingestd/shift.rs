@@ -7,7 +7,6 @@ use std::future::Future;
 use std::sync::Arc;
 use std::time::Duration;
 
-use contract::digest::Digest;
 use contract::product::ProductId;
 use contract::topic::Origin;
 use futures::FutureExt as _;
@@ -21,7 +20,7 @@ use super::publish_queue::{Number, PublishQueue};
 use super::retry::Caller;
 use super::work::{self, Done, Ended, Work, alongside};
 use super::{GROUP, IngestService, TOPIC, now};
-use crate::commit::Claim;
+use crate::commit::{Claim, ClaimName};
 use crate::error::IngestError;
 use crate::notice::{Answer, Outcome, PendingNotice};
 use crate::pipeline::metrics::{Metrics, class};
@@ -70,8 +69,8 @@ struct Shift<'a> {
     next: Number,
     work: Work<'a>,
     ended: Vec<Ended>,
-    /// Files that are there, by product and content, whose place files that were offered before them do not take.
-    claims: BTreeMap<(ProductId, Digest), Claim>,
+    /// Files that are there, whose place files that were offered before them do not take.
+    claims: BTreeMap<ClaimName, Claim>,
     /// The newest version of each product that was published here.
     published: BTreeMap<ProductId, u64>,
     /// Files to be looked at again once their product is not being published: they were there before.
@@ -271,12 +270,17 @@ impl<'a> Shift<'a> {
             self.again.push((number, claim, answer));
             return;
         }
-        let of = (claim.product.clone(), claim.raw_sha256);
+        self.claim(claim);
+        self.answered(number, answer);
+    }
+
+    /// Keeps the place of a file that is there.
+    fn claim(&mut self, claim: Claim) {
+        let of = claim.name();
         let before = self.claims.get(&of).map(|before| before.place);
         if before.is_none_or(|before| before < claim.place) {
             self.claims.insert(of, claim);
         }
-        self.answered(number, answer);
     }
 
     /// What files claim that are there, as long as others that were offered before them are on their way.
@@ -347,10 +351,17 @@ impl<'a> Shift<'a> {
                 Done::GivenUp => {}
                 Done::Published(product, answers) => {
                     self.publish_queue.free(&product);
-                    for (number, answer) in answers {
-                        if let Outcome::Landed { manifest, .. } = &answer.outcome {
-                            let newest = self.published.entry(product.clone()).or_default();
-                            *newest = manifest.number.max(*newest);
+                    for (number, answer, claim) in answers {
+                        match &answer.outcome {
+                            // The version has its place.
+                            Outcome::Landed { manifest, .. } => {
+                                let newest = self.published.entry(product.clone()).or_default();
+                                *newest = manifest.number.max(*newest);
+                            }
+                            Outcome::AlreadyLanded { .. } | Outcome::Superseded { .. } => {
+                                self.claim(claim);
+                            }
+                            Outcome::Rejected { .. } | Outcome::Observed { .. } => {}
                         }
                         self.answered(number, answer);
                     }

@@ -24,7 +24,8 @@ pub(super) type Ended = Result<Done, IngestError>;
 /// What a piece of work comes to.
 pub(super) enum Done {
     Prepared(Number, Box<Prepared>),
-    Published(ProductId, Vec<(Number, Answer)>),
+    /// With what each file has of the product, whoever brought it first.
+    Published(ProductId, Vec<(Number, Answer, Claim)>),
     /// Its message is somebody else's now.
     GivenUp,
 }
@@ -84,6 +85,7 @@ pub(super) async fn publish(
     files: Vec<(Number, StoredGranule)>,
 ) -> Ended {
     let (numbers, granules): (Vec<Number>, Vec<StoredGranule>) = files.into_iter().unzip();
+    let own: Vec<Claim> = granules.iter().map(Claim::of_granule).collect();
     let together = retry(by, "publish", || pipeline.commit(&granules, &claims)).await;
     let answers = match together {
         Ok(answers) => answers,
@@ -100,6 +102,7 @@ pub(super) async fn publish(
         }
         Err(error) => vec![by.0.refused(&granules[0].notice, error)?],
     };
-    let answers = numbers.into_iter().zip(answers).collect();
-    Ok(Done::Published(product, answers))
+    let answers = numbers.into_iter().zip(answers).zip(own);
+    let answers = answers.map(|((number, answer), claim)| (number, answer, claim));
+    Ok(Done::Published(product, answers.collect()))
 }
