@@ -18,8 +18,8 @@ use crate::{ComputeError, Engine};
 
 /// Years from which the mean of a calendar month is more than its one value.
 const SEASONS_FROM_MONTHS: usize = 24;
-/// Shares of a calendar month that differ by more than ten days of a year are different ones.
-const MONTHS_APART: f64 = 10.0 / 365.0;
+/// Shares of a calendar month that differ by more than three days of a year are different ones.
+const MONTHS_APART: f64 = 3.0 / 365.0;
 
 /// The correlation of two products over a region or at a place.
 ///

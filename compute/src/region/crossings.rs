@@ -152,7 +152,7 @@ mod tests {
         assert_eq!(too_many(&[scribble(200_000)]), Some(MOST));
         assert_eq!(too_many(&[around(999_999)]), None);
         // Polygons one over the other cross as well.
-        let both = [scribble(600), scribble(601)];
+        let both = [scribble(900), scribble(901)];
         assert_eq!(too_many(&both), Some(MOST));
         // A comb: edges side by side, of which very many pairs meet in longitude and none cross.
         let tooth = |at: usize| [[0.0, at as f64 * 1e-4], [50.0, at as f64 * 1e-4 + 5e-5]];

@@ -74,6 +74,11 @@ impl Claim {
         self.steps.iter().filter_map(own)
     }
 
+    /// Is any step of a version its own?
+    pub(super) fn has_any(&self, newest: &Manifest) -> bool {
+        self.own(newest).next().is_some()
+    }
+
     /// Brings it into the places of a version's steps.
     pub(super) fn apply(&self, newest: &Manifest, orders: &mut [Option<NoticeOrder>]) {
         if newest.product == self.product {

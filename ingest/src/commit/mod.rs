@@ -46,14 +46,31 @@ pub(crate) async fn run(
     claims: &[Claim],
 ) -> Result<Vec<Answer>, IngestError> {
     let mut all = Vec::with_capacity(granules.len());
-    // What one of them has there already, those before it leave.
-    let own = granules.iter().map(Claim::of_granule);
-    let claims: Vec<Claim> = claims.iter().cloned().chain(own).collect();
+    let claims = with_own(store, granules, claims).await?;
     let mut rest = granules;
     while !rest.is_empty() {
         let (group, later) = rest.split_at(merge::disjoint_prefix(rest));
         all.extend(publish(store, group, &claims).await?);
         rest = later;
+    }
+    Ok(all)
+}
+
+/// Claims, and those of files that are there before any of these is published: what a later one of them has, an earlier one leaves.
+async fn with_own(
+    store: &Store,
+    granules: &[StoredGranule],
+    claims: &[Claim],
+) -> Result<Vec<Claim>, IngestError> {
+    let mut all = claims.to_vec();
+    if merge::disjoint_prefix(granules) < granules.len() {
+        let newest = manifests::latest(store, &granules[0].product).await;
+        let newest = newest.map_err(IngestError::storage("read the newest manifest"))?;
+        let own = granules.iter().map(Claim::of_granule);
+        all.extend(newest.iter().flat_map(|newest| {
+            let there = |claim: &Claim| claim.has_any(newest);
+            own.clone().filter(there)
+        }));
     }
     Ok(all)
 }

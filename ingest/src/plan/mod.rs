@@ -151,11 +151,11 @@ pub(crate) async fn plan(
         holds_always: false,
     };
     let (axes, mapping) = place::mapping(&mut planning, variable).await?;
+    let periods = steps::periods(&mut planning, (variable, meaning.quantity), &axes).await?;
     if profile.is_none() && wish.meaning.is_none() {
         let time = planning.time_variable(&axes);
         method::check(variable, meaning.quantity, time.as_deref())?;
     }
-    let periods = steps::periods(&mut planning, (variable, meaning.quantity), &axes).await?;
     if matches!(meaning.quantity, Quantity::Open(_)) && open::stated_unit(variable).is_none() {
         planning.assume(format!(
             "{}: has no units; taken for a number without one, as CF says",

@@ -40,9 +40,6 @@ pub(super) async fn mapping(
         return Err(coordinate::no_grid(planning.file, variable).into());
     };
     check_others(variable, &axes)?;
-    if planning.profile.is_none() {
-        told_by_length(planning, variable, &axes)?;
-    }
     let (cells, most) = (
         u128::from(lat.len) * u128::from(lon.len),
         planning.limits.plane_cells,
@@ -58,6 +55,9 @@ pub(super) async fn mapping(
             RejectReason::TooLarge
         };
         return Err(Rejection::new(reason, &variable.name, detail).into());
+    }
+    if planning.profile.is_none() {
+        told_by_length(planning, variable, &axes)?;
     }
     let mapping = match &rules.stated {
         Some(stated) => stated_mapping(variable, stated, &lat, &lon)?,

@@ -236,21 +236,18 @@ fn bounds(name: &'static str, axis: &'static str, edges: &[[f64; 2]]) -> Made {
 /// Labels name corners of cells, and bounds say so; others are no cells side by side.
 #[tokio::test]
 async fn labels_at_corners_with_bounds_land_where_these_say() {
+    let (lat, lon) = (
+        vec![40.0, 30.0, 20.0, 10.0],
+        (0..8)
+            .map(|col| 10.0 * f64::from(col))
+            .collect::<Vec<f64>>(),
+    );
     let file = || {
-        let file = MadeFile::sst(2);
+        let file = MadeFile::sst(2).numbers("lat", &lat).numbers("lon", &lon);
         let named = |name: &'static str| move |v: Made| v.text("bounds", name);
         file.but("lat", named("lat_bnds"))
             .but("lon", named("lon_bnds"))
     };
-    let axes = file();
-    let labels = |name: &str| {
-        let variable = axes.variables.iter().find(|v| v.name == name).unwrap();
-        match &variable.values {
-            Values::Doubles(values) => values.clone(),
-            _ => panic!("{name} is of doubles"),
-        }
-    };
-    let (lat, lon) = (labels("lat"), labels("lon"));
     let step = |labels: &[f64]| labels[1] - labels[0];
     let from = |labels: &[f64], low: f64, high: f64| -> Vec<[f64; 2]> {
         let cell = step(labels).abs();
@@ -277,16 +274,16 @@ async fn labels_at_corners_with_bounds_land_where_these_say() {
         panic!("{outcome}")
     };
     let middle = place.newest(manifest.product.as_str()).await.grid;
-    // North-eastern corners are the labels.
-    let (place, outcome) = landed(from(&lat, -1.0, 0.0), from(&lon, -1.0, 0.0)).await;
+    // South-western corners are the labels.
+    let (place, outcome) = landed(from(&lat, 0.0, 1.0), from(&lon, 0.0, 1.0)).await;
     let told = assumed(&outcome);
     for name in ["lat_bnds", "lon_bnds"] {
         assert!(told.iter().any(|line| line.contains(name)), "{told:?}");
     }
     let corner = place.newest(manifest.product.as_str()).await.grid;
     assert_eq!((corner.rows, corner.cols), (middle.rows, middle.cols));
-    assert_eq!(corner.north_deg, middle.north_deg - middle.dlat_deg / 2.0);
-    assert_eq!(corner.west_deg, middle.west_deg - middle.dlon_deg / 2.0);
+    assert_eq!([middle.north_deg, middle.west_deg], [45.0, -5.0]);
+    assert_eq!([corner.north_deg, corner.west_deg], [50.0, 0.0]);
     let (_place, outcome) = landed(from(&lat, -0.1, 0.1), from(&lon, -0.5, 0.5)).await;
     let (reason, line) = refusal(&[outcome]);
     assert!(

@@ -120,7 +120,7 @@ async fn the_line_of_a_file_says_what_was_masked_and_nothing_where_nothing_was()
     let place = Place::new();
     let some = write(&place, "some.h5", &[(40, IMPLAUSIBLE)]);
     let line = place.land(&[some]).await[0].to_string();
-    assert!(line.ends_with("; 1 value masked (1 implausible)"), "{line}");
+    assert!(line.contains("; 1 value masked (1 implausible)"), "{line}");
     let none = write(&place, "none.h5", &[]);
     let line = place.land(&[none]).await[0].to_string();
     assert!(!line.contains("masked"), "{line}");
