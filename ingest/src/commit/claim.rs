@@ -13,7 +13,6 @@ use contract::notice::NoticeOrder;
 use contract::product::ProductId;
 use contract::time::Period;
 
-use super::merge::is_later_or_same;
 use crate::notice::Versioned;
 use crate::put::StoredGranule;
 
@@ -27,6 +26,12 @@ pub(crate) struct Claim {
     /// What it has a value for; with the field, if it was read anew.
     steps: Vec<(Period, Option<ObjectKey>)>,
     pub(crate) place: NoticeOrder,
+}
+
+/// Was the file that is there offered with or after a new one? Not known of steps that were landed before orders were
+/// kept: then the new one is taken to be newer.
+pub(crate) fn is_later_or_same(there: Option<NoticeOrder>, new: NoticeOrder) -> bool {
+    there.is_some_and(|there| new <= there)
 }
 
 /// Whose claim it is: product, content, and the first step, for one content may be read as different steps by its name.

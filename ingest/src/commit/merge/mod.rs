@@ -9,7 +9,7 @@ use contract::notice::NoticeOrder;
 use contract::quantity::Quantity;
 use contract::time::{Period, TimeMs};
 
-use super::Claim;
+use super::claim::{Claim, is_later_or_same};
 use crate::error::Rejection;
 use crate::put::StoredGranule;
 
@@ -292,12 +292,6 @@ fn act(placed: &[Placed], new: &Step, order: NoticeOrder) -> Result<Act, Period>
 
 fn is_same_source(there: &Step, new: &Step) -> bool {
     there.raw_sha256 == new.raw_sha256 && there.field == new.field
-}
-
-/// Was the file that is there offered with or after a new one? Not known of steps that were landed before orders were
-/// kept: then the new one is taken to be newer.
-pub(crate) fn is_later_or_same(there: Option<NoticeOrder>, new: NoticeOrder) -> bool {
-    there.is_some_and(|there| new <= there)
 }
 
 #[cfg(test)]
