@@ -1,4 +1,4 @@
-//! The versions that a derived one was made from, as its manifest says it.
+//! The versions that a derived one was made from, as its manifest says it; and which products are made of one.
 
 use contract::computed::Computation;
 use contract::manifest::{Manifest, ManifestId};

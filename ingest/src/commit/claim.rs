@@ -8,7 +8,7 @@ use std::collections::BTreeSet;
 
 use contract::digest::Digest;
 use contract::key::ObjectKey;
-use contract::manifest::Manifest;
+use contract::manifest::{Manifest, Step};
 use contract::notice::NoticeOrder;
 use contract::product::ProductId;
 use contract::time::Period;
@@ -57,7 +57,7 @@ impl Claim {
 
     /// That of a file that is about to be published.
     pub(crate) fn of_granule(granule: &StoredGranule) -> Self {
-        let step = |step: &contract::manifest::Step| (step.period, Some(step.field.clone()));
+        let step = |step: &Step| (step.period, Some(step.field.clone()));
         Self {
             product: granule.product.clone(),
             version: 0,

@@ -148,19 +148,17 @@ fn what_does_not_belong_together_is_refused_with_what_to_write() {
     assert!(said(shared_grid(&[])).contains("no product"));
 }
 
+/// A month of a product, by the name that an expression has for it.
+fn of(name: &str, quantity: Quantity) -> Input {
+    let month = months(2010, 1..=1);
+    let mut input = input("p", one_degree(3), &month, Matching::SamePeriod);
+    input.name = name.to_owned();
+    input.manifest.quantity = quantity;
+    input
+}
+
 #[test]
 fn partial_pressure_and_fugacity_are_not_mixed_unless_one_is_converted() {
-    let of = |name: &str, quantity| {
-        let mut input = input(
-            "p",
-            one_degree(3),
-            &months(2010, 1..=1),
-            Matching::SamePeriod,
-        );
-        input.name = name.to_owned();
-        input.manifest.quantity = quantity;
-        input
-    };
     let ask = |inputs: &[Input], expression: &str| {
         let expression = expression.to_owned();
         pressures_of_a_kind(inputs, &Computation::Expression { expression })
@@ -175,17 +173,6 @@ fn partial_pressure_and_fugacity_are_not_mixed_unless_one_is_converted() {
 
 #[test]
 fn water_is_no_air_and_the_skin_is_not_below_itself() {
-    let of = |name: &str, quantity| {
-        let mut input = input(
-            "p",
-            one_degree(3),
-            &months(2010, 1..=1),
-            Matching::SamePeriod,
-        );
-        input.name = name.to_owned();
-        input.manifest.quantity = quantity;
-        input
-    };
     let open = |place: &str| {
         let name = format!("surface_partial_pressure_of_carbon_dioxide_in_{place}");
         Quantity::open(&name, "Pa", "Pressure").unwrap()

@@ -88,8 +88,10 @@ pub(super) fn merge(
 ) -> Merged {
     let steps = newest.map_or_else(Vec::new, |m| m.steps.clone());
     let mut orders = newest.map_or_else(Vec::new, Manifest::notice_orders);
-    for claim in claims {
-        newest.inspect(|newest| claim.apply(newest, &mut orders));
+    if let Some(newest) = newest {
+        for claim in claims {
+            claim.apply(newest, &mut orders);
+        }
     }
     let mut placed: Vec<Placed> = steps.into_iter().zip(orders).collect();
     let mut merged = Merged {
