@@ -22,7 +22,7 @@ use std::sync::Arc;
 
 use contract::ContractError;
 use contract::analysis::{MapOptions, MapStatistic};
-use contract::computed::Computed;
+use contract::computed::{Computation, Computed};
 use contract::grid::Grid;
 use contract::manifest::{MANIFEST_SCHEMA, Manifest};
 use contract::product::ProductId;
@@ -210,6 +210,7 @@ impl<'a> Asked<'a> {
                 return Err(ContractError::invalid("product", target.as_str(), reason).into());
             }
             if is_still_asked.is_none() {
+                check_statistic(&latest, options.statistic)?;
                 check_grid(engine, &latest, &plan, stored).await?;
             }
             if plan.has_values_of(&latest, stored) {
@@ -228,6 +229,23 @@ impl<'a> Asked<'a> {
             plan,
             there,
         })
+    }
+}
+
+/// # Errors
+/// The version there is holds another statistic, which the next one would silently replace.
+fn check_statistic(latest: &Manifest, asked: MapStatistic) -> Result<(), ContractError> {
+    let there = latest.computed.as_ref().and_then(|own| match own.how {
+        Computation::Correlation { statistic, .. } => Some(MapStatistic::Correlation(statistic)),
+        ref how => how.statistic(),
+    });
+    match there {
+        Some(there) if there != asked => Err(ContractError::invalid(
+            "product",
+            latest.product.as_str(),
+            format!("it is the {there}, and would become the {asked}: give another name"),
+        )),
+        _ => Ok(()),
     }
 }
 

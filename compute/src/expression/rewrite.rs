@@ -12,7 +12,7 @@ use datafusion::logical_expr::expr::{Case, ScalarFunction};
 use datafusion::logical_expr::{Expr, ScalarUDF, lit};
 
 use super::function::Function;
-use super::typed::UNIT_KEY;
+use super::typed::{OFFSET_KEY, UNIT_KEY};
 use super::udf::NumberFunction;
 use super::unit::Scaled;
 
@@ -58,7 +58,10 @@ fn with_unit(arguments: &[Expr]) -> Result<Expr> {
     let Some(scaled) = Scaled::parse(unit) else {
         return plan_err!("{unit:?} is no unit that is known here");
     };
-    let metadata = BTreeMap::from([(UNIT_KEY.to_owned(), scaled.unit.to_string())]);
+    let mut metadata = BTreeMap::from([(UNIT_KEY.to_owned(), scaled.unit.to_string())]);
+    if scaled.offset != 0.0 {
+        metadata.insert(OFFSET_KEY.to_owned(), format!("unit({value}, '{unit}')"));
+    }
     let si = value * scaled.factor + scaled.offset;
     Ok(Expr::Literal(
         ScalarValue::from(si),

@@ -117,6 +117,12 @@ fn mixed_units_and_whatever_is_no_arithmetic_are_refused_with_the_reason() {
         ("schmidt_wanninkhof2014(sst, ice)", "2 arguments are given"),
         ("sst > unit(280, 'K')", "it is a comparison"),
         ("unit(1, 'furlong') * sst", "no unit"),
+        (
+            "sst - unit(0.17, 'degC')",
+            "unit(0.17, 'degC') in arithmetic may be a temperature or a difference",
+        ),
+        ("sst * unit(2, 'degC')", "may be a temperature"),
+        ("sst + -unit(2, 'degC')", "may be a temperature"),
         ("nobody * 2", "nobody"),
         ("sin(ice)", "the function sin is not one of"),
         ("ice % 2", "operator %"),

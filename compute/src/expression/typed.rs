@@ -64,7 +64,10 @@ pub(super) fn typed(expr: &Expr, units: &Units) -> Result<Typed, String> {
             None => Typed::Number(Unit::ONE),
         }),
         Expr::BinaryExpr(binary) => of_binary(binary, units),
-        Expr::Negative(inner) => typed(inner, units)?.unit("-").map(Typed::Number),
+        Expr::Negative(inner) => {
+            refuse_offset(inner)?;
+            typed(inner, units)?.unit("-").map(Typed::Number)
+        }
         Expr::Not(inner) => truth(inner, units),
         Expr::Between(between) => {
             let middle = typed(&between.expr, units)?;
@@ -84,6 +87,23 @@ pub(super) fn typed(expr: &Expr, units: &Units) -> Result<Typed, String> {
 /// Key of a literal's unit in what is told beside its value.
 pub(super) const UNIT_KEY: &str = "unit";
 
+/// Key of a literal as it was written, where its unit counts from elsewhere than zero.
+pub(super) const OFFSET_KEY: &str = "offset";
+
+/// A number of degrees Celsius in arithmetic may be a temperature or a difference of two, which lie 273.15 K apart: it is
+/// one in comparisons and where a function takes a temperature, and nowhere else.
+fn refuse_offset(expr: &Expr) -> Result<(), String> {
+    let Expr::Literal(_, Some(metadata)) = expr else {
+        return Ok(());
+    };
+    match metadata.inner().get(OFFSET_KEY) {
+        Some(written) => Err(format!(
+            "{written} in arithmetic may be a temperature or a difference of two: write it in K, as unit(0.17, 'K') for a difference"
+        )),
+        None => Ok(()),
+    }
+}
+
 fn unit_in(metadata: &BTreeMap<String, String>) -> Result<Unit, String> {
     let text = metadata.get(UNIT_KEY).map_or("1", String::as_str);
     super::unit::Scaled::parse(text)
@@ -102,6 +122,13 @@ fn of_binary(binary: &BinaryExpr, units: &Units) -> Result<Typed, String> {
     let whole = || format!("{} {} {}", binary.left, binary.op, binary.right);
     let sides = || Ok::<_, String>((typed(&binary.left, units)?, typed(&binary.right, units)?));
     let too_high = || format!("{}: its unit has too high a power", whole());
+    if matches!(
+        binary.op,
+        Operator::Plus | Operator::Minus | Operator::Multiply | Operator::Divide
+    ) {
+        refuse_offset(&binary.left)?;
+        refuse_offset(&binary.right)?;
+    }
     match binary.op {
         Operator::Plus | Operator::Minus => {
             let (left, right) = sides()?;

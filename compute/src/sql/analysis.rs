@@ -34,7 +34,7 @@ pub(super) static KIND: Kind = Kind {
 pub(super) const ABOUT: [&str; 4] = [
     "analysis",
     "analysis('product', 'region'|'LON,LAT'|'LON,LAT;LON,LAT;...', 'climatology'|'anomaly'|'trend', 'bins'|'step') as a table",
-    "what is made of the series of a place, region or line, in the unit that people read; bins or step month if left out",
+    "what is made of the series of a place, region or line, in the unit that people read, and in notes what may surprise: steps that cover little of a region, steps without data; bins or step month if left out",
     "",
 ];
 
@@ -99,7 +99,7 @@ impl Question for Analysis {
         let number = |name: &str| Field::new(name, DataType::Float64, true);
         let count = |name: &str| Field::new(name, DataType::UInt64, false);
         let unit = Field::new("unit", DataType::Utf8, false);
-        Arc::new(Schema::new(match self.made {
+        let mut fields = match self.made {
             Made::Climatology => vec![
                 Field::new("bin", DataType::Utf8, false),
                 number("mean"),
@@ -131,7 +131,9 @@ impl Question for Analysis {
                 Field::new("deseasonalised", DataType::Boolean, false),
                 unit,
             ],
-        }))
+        };
+        fields.push(Field::new("notes", DataType::Utf8, true));
+        Arc::new(Schema::new(fields))
     }
 
     fn over(&self, region: AskedRegion) -> Arc<dyn Question> {
@@ -160,6 +162,7 @@ impl Analysis {
     fn columns(&self, answer: SeriesAnalysis) -> Result<Vec<ArrayRef>, ComputeError> {
         let SeriesAnalysis {
             cited,
+            notes,
             refused,
             climatology: by_bin,
             anomaly: by_step,
@@ -171,8 +174,16 @@ impl Analysis {
             Made::Anomaly => by_step.map(|made| anomaly(&made, &cited.unit)),
             Made::Trend => line.map(|made| trend(&made)),
         };
+        // Steps that cover little of a region, or none, are told with every row: nobody sees an answer beside its table here.
+        let with_notes = |mut columns: Vec<ArrayRef>| {
+            let count = columns.first().map_or(0, |column| column.len());
+            let notes = (!notes.is_empty()).then(|| notes.join("; "));
+            let notes = std::iter::repeat_n(notes, count).collect::<StringArray>();
+            columns.push(Arc::new(notes));
+            columns
+        };
         // What is not defined is no empty table.
-        columns.ok_or_else(|| {
+        columns.map(with_notes).ok_or_else(|| {
             let reason = refused.into_iter().next().map(|one| one.reason);
             let what = self.options.parts[0].as_str();
             let reason = reason.unwrap_or_else(|| "nothing was made".to_owned());

@@ -61,6 +61,8 @@ mod remembered_sums;
 #[cfg(test)]
 mod sql;
 #[cfg(test)]
+mod sql_analysis;
+#[cfg(test)]
 mod statistics;
 #[cfg(test)]
 mod stored_sums;

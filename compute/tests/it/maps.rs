@@ -430,6 +430,23 @@ fn of(statistic: MapStatistic, region: Option<&str>, name: &str) -> MapOptions {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn another_statistic_does_not_take_the_place_of_one() {
+    let (_folder, store) = folder_store();
+    landed(&store).await;
+    let engine = Engine::in_process(store.clone(), parts(2));
+    let spread = of(MapStatistic::Spread, None, "here");
+    assert_eq!(derived(&engine, &spread).await.unwrap().number, 1);
+    let other = of(MapStatistic::Mean, None, "here");
+    let refused = derived(&engine, &other).await.unwrap_err().to_string();
+    for part in ["it is the", "would become the", "give another name"] {
+        assert!(refused.contains(part), "{refused}");
+    }
+    // The same statistic of other cells is a version of it.
+    let part = of(MapStatistic::Spread, Some(OBLONG), "here");
+    assert_eq!(derived(&engine, &part).await.unwrap().number, 2);
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn a_region_has_the_values_of_the_whole_in_its_cells_and_none_elsewhere() {
     let (_folder, store) = folder_store();
     landed(&store).await;

@@ -27,7 +27,7 @@ use crate::fixture::{folder_store, land, months, parts, product, wavy_year};
 use crate::reading::Counting;
 
 /// A grid of 3 x 2 chunks, across the date line.
-const GRID: Grid = Grid {
+pub(crate) const GRID: Grid = Grid {
     rows: 130,
     cols: 150,
     north_deg: 65.0,
@@ -56,16 +56,16 @@ async fn sst(store: &Store) {
     land(store, &product("sst-test"), quantity, GRID, &year()).await;
 }
 
-const LIMITS: SqlLimits = SqlLimits {
+pub(crate) const LIMITS: SqlLimits = SqlLimits {
     memory_bytes: 256 << 20,
     time: Duration::from_mins(2),
 };
 
-fn sql_of(engine: &Engine) -> Sql {
+pub(crate) fn sql_of(engine: &Engine) -> Sql {
     Sql::new(engine, LIMITS).unwrap()
 }
 
-async fn ask(sql: &Sql, text: &str) -> Result<RecordBatch, ComputeError> {
+pub(crate) async fn ask(sql: &Sql, text: &str) -> Result<RecordBatch, ComputeError> {
     let mut rows = sql.ask(text).await?;
     let mut batches = vec![];
     while let Some(batch) = rows.next().await? {
@@ -75,7 +75,7 @@ async fn ask(sql: &Sql, text: &str) -> Result<RecordBatch, ComputeError> {
 }
 
 /// Rows as texts.
-async fn texts(sql: &Sql, text: &str) -> Vec<Vec<String>> {
+pub(crate) async fn texts(sql: &Sql, text: &str) -> Vec<Vec<String>> {
     let batch = ask(sql, text)
         .await
         .unwrap_or_else(|e| panic!("{text}: {e}"));
@@ -93,7 +93,7 @@ async fn texts(sql: &Sql, text: &str) -> Vec<Vec<String>> {
         .collect()
 }
 
-async fn one(sql: &Sql, text: &str) -> String {
+pub(crate) async fn one(sql: &Sql, text: &str) -> String {
     let rows = texts(sql, text).await;
     assert_eq!((rows.len(), rows[0].len()), (1, 1), "{text}: {rows:?}");
     rows[0][0].clone()
@@ -656,6 +656,29 @@ async fn budgets_are_tables_whose_sums_are_exact() {
     assert_eq!(one(&sql, closed).await, "true");
 }
 
+/// Eight years of months that rise by some 1.2 kelvin a decade, with a season; and what is told of a region of them.
+pub(crate) async fn analysed(store: &Store) -> (Engine, SeriesAnalysis) {
+    let years = (2001..2009).flat_map(months).enumerate();
+    let steps = years.map(|(month, period)| {
+        let wave = (month % 12) as f32 + 0.01 * month as f32 + ((month * 7) % 5) as f32 * 0.1;
+        let cell = |cell: usize| 280.0 + wave + cell as f32 * 1e-4;
+        (period, (0..GRID.cell_count()).map(cell).collect())
+    });
+    let steps: Vec<(Period, Vec<f32>)> = steps.collect();
+    let quantity = Quantity::SeaSurfaceTemperature;
+    let manifest = land(store, &product("sst"), quantity, GRID, &steps).await;
+    let engine = Engine::in_process(store.clone(), parts(2));
+    let id = manifest.id();
+    let of = SeriesWishes {
+        region: Some("162,-10,170,10".parse().unwrap()),
+        ..SeriesWishes::default()
+    };
+    let of = of.query(product("sst")).unwrap();
+    let options = AnalysisOptions::new(AnalysisPart::ALL.to_vec()).unwrap();
+    let answer = analyse(&engine, (&manifest, &id), &of, &options).await;
+    (engine, answer.unwrap())
+}
+
 /// The cells of a mask beside the box that they fill: the same rows, but for what areas are rounded to.
 #[tokio::test(flavor = "multi_thread")]
 async fn cells_of_a_mask_are_a_region_of_each_function() {
@@ -718,96 +741,6 @@ async fn cells_of_a_mask_are_a_region_of_each_function() {
             );
         }
     }
-}
-
-/// Eight years of months that rise by some 1.2 kelvin a decade, with a season; and what is told of a region of them.
-async fn analysed(store: &Store) -> (Engine, SeriesAnalysis) {
-    let years = (2001..2009).flat_map(months).enumerate();
-    let steps = years.map(|(month, period)| {
-        let wave = (month % 12) as f32 + 0.01 * month as f32 + ((month * 7) % 5) as f32 * 0.1;
-        let cell = |cell: usize| 280.0 + wave + cell as f32 * 1e-4;
-        (period, (0..GRID.cell_count()).map(cell).collect())
-    });
-    let steps: Vec<(Period, Vec<f32>)> = steps.collect();
-    let quantity = Quantity::SeaSurfaceTemperature;
-    let manifest = land(store, &product("sst"), quantity, GRID, &steps).await;
-    let engine = Engine::in_process(store.clone(), parts(2));
-    let id = manifest.id();
-    let of = SeriesWishes {
-        region: Some("162,-10,170,10".parse().unwrap()),
-        ..SeriesWishes::default()
-    };
-    let of = of.query(product("sst")).unwrap();
-    let options = AnalysisOptions::new(AnalysisPart::ALL.to_vec()).unwrap();
-    let answer = analyse(&engine, (&manifest, &id), &of, &options).await;
-    (engine, answer.unwrap())
-}
-
-fn analysis_of(word: &str, columns: &str) -> String {
-    format!("SELECT {columns} FROM analysis('sst', '162,-10,170,10', '{word}')")
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn climatologies_and_anomalies_are_tables() {
-    let (_folder, store) = folder_store();
-    let (engine, answer) = analysed(&store).await;
-    let sql = sql_of(&engine);
-    let asked = analysis_of("climatology", "bin, mean, spread, count, years, unit");
-    let rows = texts(&sql, &asked).await;
-    let own = answer.climatology.as_ref().unwrap();
-    assert_eq!(rows.len(), 12);
-    for (row, own) in rows.iter().zip(&own.rows) {
-        let numbers = [own.mean, own.spread].map(|number| number.unwrap().to_string());
-        assert_eq!(row[0], own.bin);
-        assert_eq!(row[1..3], numbers);
-        assert_eq!(row[3..], ["8", "8", "°C"]);
-    }
-    let columns = "time_start, value, normal, anomaly, standardised";
-    let rows = texts(&sql, &analysis_of("anomaly", columns)).await;
-    let own = answer.anomaly.as_ref().unwrap();
-    assert_eq!(rows.len(), 96);
-    for (row, own) in rows.iter().zip(&own.rows) {
-        let numbers = [own.value, own.normal, own.anomaly, own.standardised];
-        assert_eq!(row[0], own.start.to_string());
-        assert_eq!(row[1..], numbers.map(|number| number.unwrap().to_string()));
-    }
-    let seasons = "SELECT count(*) FROM analysis('sst', '162.3,0.5', 'climatology', 'season')";
-    assert_eq!(one(&sql, seasons).await, "4");
-    // Along a line it is made of the means that `stats` tells.
-    let along = "SELECT count(*) FROM analysis('sst', '162,0;170,5', 'anomaly') a JOIN stats('sst', '162,0;170,5') s
-        USING (time_start) WHERE a.value = s.mean";
-    assert_eq!(one(&sql, along).await, "96");
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn a_trend_is_a_table_of_one_row_or_an_error_that_says_why_there_is_none() {
-    let (_folder, store) = folder_store();
-    let (engine, answer) = analysed(&store).await;
-    let sql = sql_of(&engine);
-    let columns = "slope_per_decade, lower_per_decade, upper_per_decade, p_value, tau, least_squares_per_decade, least_squares_p_value, count, deseasonalised, unit";
-    let rows = texts(&sql, &analysis_of("trend", columns)).await;
-    let own = answer.trend.as_ref().unwrap();
-    let (robust, squares) = (&own.theil_sen, &own.least_squares);
-    let numbers = [
-        robust.slope_per_decade,
-        robust.lower_per_decade,
-        robust.upper_per_decade,
-        own.mann_kendall.p_value,
-        own.mann_kendall.tau,
-        squares.slope_per_decade,
-        squares.p_value.unwrap(),
-    ];
-    assert_eq!(rows.len(), 1);
-    let told = rows[0][..7].iter().map(|text| text.parse().unwrap());
-    assert_eq!(told.collect::<Vec<f64>>(), numbers);
-    assert_eq!(rows[0][7..], ["96", "true", "°C per decade"]);
-    assert!(robust.slope_per_decade > 1.0, "{robust:?}");
-    let yearly = "SELECT count FROM analysis('sst', '162.3,0.5', 'trend', 'year')";
-    let error = ask(&sql, yearly).await.unwrap_err().to_string();
-    assert!(
-        error.contains("needs 10 values, and there are 8"),
-        "{error}"
-    );
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -48,7 +48,7 @@ pub(crate) struct Analysis {
     /// Means that the trend is drawn through; steps as they are where those are longer. Months if absent.
     #[arg(long, value_name = STEPS, help_heading = HEADING)]
     trend_step: Option<TimeStep>,
-    /// Draw it too: the series (with --statistic mean,std also its spread), its climatology, its anomalies or its trend.
+    /// Draw it too: the series (with --statistic mean,std also its spread), its climatology, its anomalies and its trend, those that are asked for one below the other.
     #[arg(long, value_name = "FILE.svg|FILE.png", help_heading = HEADING)]
     pub(crate) plot: Option<PlotFile>,
 }

@@ -43,16 +43,20 @@ pub(crate) fn of_statistics(answer: &StatisticsAnswer) -> Result<String> {
     rows::of_statistics(answer)
 }
 
-/// The first of climatology, anomalies and trend that there is.
+/// Climatology, anomalies and trend, those that there are, one below the other.
 pub(crate) fn of_analysis(answer: &SeriesAnalysis) -> Result<String> {
+    let mut drawn = vec![];
     if let Some(made) = &answer.climatology {
-        return climatology::drawn(answer, made);
+        drawn.push(climatology::drawn(answer, made)?);
     }
     if let Some(made) = &answer.anomaly {
-        return lines::of_anomalies(answer, made);
+        drawn.push(lines::of_anomalies(answer, made)?);
     }
     if answer.trend.is_some() {
-        return trend::of_trend(answer);
+        drawn.push(trend::of_trend(answer)?);
+    }
+    if !drawn.is_empty() {
+        return Ok(page::stacked(drawn));
     }
     let reasons: Vec<&str> = answer
         .refused

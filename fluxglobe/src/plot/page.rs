@@ -69,6 +69,24 @@ pub(super) fn drawn(
     Ok(svg)
 }
 
+/// Drawings one below the other, in one.
+pub(super) fn stacked(mut drawn: Vec<String>) -> String {
+    if drawn.len() == 1 {
+        return drawn.remove(0);
+    }
+    let (width, height) = SIZE;
+    let all = height as usize * drawn.len();
+    let mut svg = format!(
+        "<svg width=\"{width}\" height=\"{all}\" viewBox=\"0 0 {width} {all}\" xmlns=\"http://www.w3.org/2000/svg\">\n"
+    );
+    for (place, one) in drawn.iter().enumerate() {
+        let top = height as usize * place;
+        svg.push_str(&one.replacen("<svg ", &format!("<svg y=\"{top}\" "), 1));
+    }
+    svg.push_str("</svg>\n");
+    svg
+}
+
 fn on_page(
     words: &Words,
     chart: impl FnOnce(&Area<'_>) -> Result<(), Failed>,

@@ -92,6 +92,31 @@ fn a_trend_is_its_values_two_lines_and_their_bands() {
     assert_eq!(svg.matches("<polygon").count(), 2);
 }
 
+#[test]
+fn what_is_asked_for_together_is_drawn_one_below_the_other() {
+    let trend = analysis("trend", trend_of(|index| f64::from(index) / 100.0));
+    let row = |bin: u32| json!({"bin": "m", "mean": f64::from(bin), "spread": 1.0, "count": 3, "years": 3});
+    let rows: Vec<Value> = (0..12).map(row).collect();
+    let made = json!({"bins": "month", "base": "2001/2010", "rows": rows});
+    let normals = analysis("climatology", made);
+    let both = SeriesAnalysis {
+        climatology: normals.climatology.clone(),
+        ..trend.clone()
+    };
+    let svg = of_analysis(&both).unwrap();
+    is_told(&svg);
+    for (own, text) in [(&normals, "Jan"), (&trend, "Theil-Sen")] {
+        let own = of_analysis(own).unwrap();
+        assert!(own.contains(text) && svg.contains(text), "{text}");
+        let (_, marks) = own.split_once('\n').unwrap();
+        assert!(
+            svg.contains(marks.trim_end()),
+            "{text} is drawn as by itself"
+        );
+    }
+    assert!(svg.contains("<svg y=\"620\"") && svg.contains("height=\"1240\""));
+}
+
 /// The highest value is the first one, in the corner of the legend.
 #[test]
 fn a_legend_hides_no_value() {
