@@ -1,8 +1,5 @@
 //! How a series goes together with itself some steps later, and how many of its values are worth one of their own.
 
-/// Lags that are summed side by side.
-const LANES: usize = 8;
-
 /// Correlation of a series with itself `lag` steps later, -1 to 1; 0 where nothing is left to compare or nothing varies.
 ///
 /// `values` are one for each step at equal distances, NaN no data. Sums of products about the one mean over the sum of
@@ -18,34 +15,6 @@ pub fn autocorrelation(values: &[f64], lag: usize) -> f64 {
         pairs += about.is_there[at] * about.is_there[at + lag];
     }
     about.correlation(values.len(), lag, products, pairs)
-}
-
-/// The same at every lag from 0 on, one for each value.
-pub fn autocorrelations(values: &[f64]) -> Vec<f64> {
-    let steps = values.len();
-    let mut about = About::mean_of(values);
-    // What is beyond the end adds nothing, so that lags can be summed side by side, each in the order of time.
-    about.left.resize(steps + LANES, 0.0);
-    about.is_there.resize(steps + LANES, 0.0);
-    let mut found = Vec::with_capacity(steps + LANES);
-    for first in (0..steps).step_by(LANES) {
-        let (mut products, mut pairs) = ([0.0; LANES], [0.0; LANES]);
-        for at in 0..steps - first {
-            let (left, is_there) = (about.left[at], about.is_there[at]);
-            let later = &about.left[at + first..][..LANES];
-            let later_there = &about.is_there[at + first..][..LANES];
-            for lane in 0..LANES {
-                products[lane] += left * later[lane];
-                pairs[lane] += is_there * later_there[lane];
-            }
-        }
-        let lags = first..(first + LANES).min(steps);
-        let each = lags.zip(products.into_iter().zip(pairs));
-        found.extend(
-            each.map(|(lag, (products, pairs))| about.correlation(steps, lag, products, pairs)),
-        );
-    }
-    found
 }
 
 /// Values less their mean.
@@ -96,25 +65,6 @@ pub fn effective_count(count: usize, r: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn all_lags_at_once_have_the_bits_of_each() {
-        for count in [0, 1, 2, 7, 8, 9, 40, 193] {
-            let wave = |at: usize| (at as f64 * 0.7).sin() + (at * at % 11) as f64;
-            let mut values: Vec<f64> = (0..count).map(wave).collect();
-            for gaps in [0, 1, 5] {
-                for at in (0..count).filter(|at| gaps > 0 && at % 7 < gaps) {
-                    values[at] = f64::NAN;
-                }
-                let all = autocorrelations(&values);
-                assert_eq!(all.len(), count);
-                for (lag, found) in all.iter().enumerate() {
-                    let own = autocorrelation(&values, lag);
-                    assert_eq!(own.to_bits(), found.to_bits(), "{count} {gaps} {lag}");
-                }
-            }
-        }
-    }
 
     /// By hand: 1, 2, 3, 4 about 2.5: squares 5; one later 0.75 - 0.25 + 0.75 = 1.25.
     #[test]

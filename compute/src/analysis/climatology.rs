@@ -142,14 +142,14 @@ pub fn less_their_months_exactly(months: &[usize], values: &[f64]) -> Vec<f64> {
 /// A series without its season.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Seasonless {
-    /// Values less the means of their calendar months, which take with them what rises within a year: no trend, no rise.
+    /// Values less the means of their calendar months or seasons, which take with them what rises within a year: no trend, no rise.
     pub less: Vec<f64>,
     /// The same with the line that was found together with the means of months: rising as the series does.
     pub with_line: Vec<f64>,
     /// What squares of times come to beside the means of months, years²: how well a slope is known.
     pub squared_years: f64,
-    /// Calendar months that have values.
-    pub month_count: usize,
+    /// Calendar months, or seasons, that have values.
+    pub part_count: usize,
 }
 
 impl Seasonless {
@@ -190,7 +190,7 @@ impl Seasonless {
             less,
             with_line,
             squared_years,
-            month_count: has.len(),
+            part_count: has.len(),
         }
     }
 }

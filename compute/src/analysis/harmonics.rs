@@ -22,6 +22,11 @@ const LINE_YEARS: f64 = 1.99;
 const LEAST_YEARS: f64 = 0.9;
 /// Longest step that a wave of half a year is seen in, s: a third of it.
 const LONGEST_STEP_S: f64 = 62.0 * 86_400.0;
+/// Longest part of the year without data, beyond which a wave of a year is what the noise beside it makes of it: after three months the error
+/// of an amplitude is twice that of values all the year round, after four 3.4 times, after six 16 times.
+const LONGEST_GAP_DAYS: usize = 110;
+/// Days of a year that are looked at, the last one a little longer.
+const YEAR_DAYS: usize = 365;
 /// 2000-01-01, ms since 1970.
 const START_MS: f64 = 946_684_800_000.0;
 
@@ -31,13 +36,17 @@ const START_MS: f64 = 946_684_800_000.0;
 /// wave over a step's period: monthly means flatten a year's wave by 1.1 %, which a wave read at their middles would lose.
 ///
 /// # Errors
-/// Fewer than eight values, less than a year, steps of more than two months, or steps that leave several answers.
+/// Fewer than eight values, less than a year, steps of more than two months, steps that leave several answers, or nearly a third of the year
+/// without data in any year.
 pub fn season(periods: &[Period], values: &[f64]) -> Result<Season, Undefined> {
     let both = periods.iter().zip(values).filter(|(_, v)| !v.is_nan());
     let (here, values): (Vec<Period>, Vec<f64>) = both.unzip();
     let years = years_of(&here, &values, longest_s(periods))?;
     let has_trend = years >= LINE_YEARS;
     let undetermined = || Undefined::Undetermined { what: WHAT };
+    if longest_gap_days(&here) > LONGEST_GAP_DAYS {
+        return Err(undetermined());
+    }
     let fitted = if has_trend {
         with_line(&here, &values, years)
     } else {
@@ -94,6 +103,29 @@ fn years_of(periods: &[Period], values: &[f64], step_s: f64) -> Result<f64, Unde
         return Err(Undefined::Constant { what, count: found });
     }
     Ok(found_years)
+}
+
+/// The longest part of the year, of so many days, that none of some periods lies in, whatever the year.
+fn longest_gap_days(periods: &[Period]) -> usize {
+    let mut is_held = [false; YEAR_DAYS];
+    let day = |ms: i64| {
+        let share = ((ms as f64 - START_MS) / YEAR_MS).rem_euclid(1.0);
+        ((share * YEAR_DAYS as f64) as usize).min(YEAR_DAYS - 1)
+    };
+    for period in periods {
+        let (first, last) = (day(period.start.ms()), day(period.end.ms() - 1));
+        let count = (last + YEAR_DAYS - first) % YEAR_DAYS;
+        for own in first..=first + count {
+            is_held[own % YEAR_DAYS] = true;
+        }
+    }
+    // The year goes round: a gap over its end is one.
+    let (mut longest, mut now) = (0, 0);
+    for is_held in is_held.iter().chain(&is_held) {
+        now = if *is_held { 0 } else { now + 1 };
+        longest = longest.max(now);
+    }
+    longest.min(YEAR_DAYS)
 }
 
 /// What a fit found.

@@ -46,7 +46,7 @@ pub fn least_squares(
         .sum();
     let r = autocorrelation(&residuals, 1);
     let effective = effective_count(count, r);
-    let means = season.map_or(1, |season| season.month_count.max(1));
+    let means = season.map_or(1, |season| season.part_count.max(1));
     let freedom = effective - 2.0 - (means - 1) as f64 * effective / n;
     let known = season.map_or(xx, |season| season.squared_years);
     let error = (freedom > 0.0 && known > 0.0).then(|| (squares / freedom / known).sqrt());

@@ -17,11 +17,18 @@ pub struct MeanOverTime {
     pub effective_count: Option<f64>,
     /// Variance of the mean by the spread of `about`.
     variance: Option<f64>,
+    /// Degrees of freedom of that.
+    freedom: f64,
 }
 
 /// The mean of `values` (beside `periods`, NaN no data, any unit) over time. Its error comes from the spread of `about`, one
-/// beside each value: the values less what is no chance in them, such as their seasons.
-pub fn mean_over_time(periods: &[Period], values: &[f64], about: &[f64]) -> MeanOverTime {
+/// beside each value: the values less what is no chance in them, such as their seasons, of which `means` were taken off: each takes a value's
+/// worth of the spread with it.
+pub fn mean_over_time(
+    periods: &[Period],
+    values: &[f64],
+    (about, means): (&[f64], usize),
+) -> MeanOverTime {
     let (mut sum, mut seconds, mut count) = (0.0, 0.0, 0);
     for (period, value) in periods.iter().zip(values).filter(|(_, v)| !v.is_nan()) {
         sum += value * period.seconds();
@@ -32,11 +39,15 @@ pub fn mean_over_time(periods: &[Period], values: &[f64], about: &[f64]) -> Mean
     let spread = super::climatology::spread(&present);
     let next = || autocorrelation(&with_holes(periods, about), 1);
     let effective = spread.map(|_| effective_count(count, next()));
+    let (n, further) = (count as f64, means.max(1) as f64 - 1.0);
+    let left = n - 1.0 - further;
+    let variance = spread.zip(effective).filter(|_| left > 0.0);
     MeanOverTime {
         count,
         mean: (count > 0).then(|| sum / seconds),
         effective_count: effective,
-        variance: spread.zip(effective).map(|(spread, n)| spread * spread / n),
+        variance: variance.map(|(spread, of)| spread * spread * ((n - 1.0) / left) / of),
+        freedom: effective.map_or(0.0, |of| of - 1.0 - further * of / n),
     }
 }
 
@@ -44,14 +55,13 @@ pub fn mean_over_time(periods: &[Period], values: &[f64], about: &[f64]) -> Mean
 /// doi:10.1093/biomet/34.1-2.28, with effective numbers. None where either side has fewer than two steps, or no degree of freedom.
 pub fn welch(a: &MeanOverTime, b: &MeanOverTime) -> Option<(f64, Option<f64>)> {
     let (va, vb) = (a.variance?, b.variance?);
-    let (na, nb) = (a.effective_count?, b.effective_count?);
     let error = (va + vb).sqrt();
     let difference = a.mean? - b.mean?;
     if error <= 0.0 {
         return Some((0.0, None));
     }
-    let freedom = (va + vb).powi(2) / (va * va / (na - 1.0) + vb * vb / (nb - 1.0));
-    let p_value = (na > 1.0 && nb > 1.0)
+    let freedom = (va + vb).powi(2) / (va * va / a.freedom + vb * vb / b.freedom);
+    let p_value = (a.freedom > 0.0 && b.freedom > 0.0)
         .then(|| student_two_sided(difference / error, freedom))
         .flatten();
     Some((error, p_value))
@@ -71,10 +81,10 @@ mod tests {
     fn steps_count_by_their_length() {
         let year = months(12);
         let values: Vec<f64> = (0..12).map(|m| if m == 1 { 1.0 } else { 0.0 }).collect();
-        let found = mean_over_time(&year, &values, &values);
+        let found = mean_over_time(&year, &values, (&values, 1));
         assert!((found.mean.unwrap() - 28.0 / 365.0).abs() < 1e-15);
         assert_eq!(
-            mean_over_time(&year, &[f64::NAN; 12], &[f64::NAN; 12]).mean,
+            mean_over_time(&year, &[f64::NAN; 12], (&[f64::NAN; 12], 1)).mean,
             None
         );
     }
@@ -86,7 +96,7 @@ mod tests {
         let year = months(12);
         let periods = [year[0], year[1], year[3], year[4]];
         let values = [1.0, 1.0, 2.0, 2.0];
-        let found = mean_over_time(&periods, &values, &values);
+        let found = mean_over_time(&periods, &values, (&values, 1));
         let expected = 4.0 * (1.0 - 0.8) / (1.0 + 0.8);
         assert!((found.effective_count.unwrap() - expected).abs() < 1e-12);
     }
@@ -105,14 +115,46 @@ mod tests {
         let a = [1.0, 3.0, 0.5, 2.5, 1.5, 3.5, 0.0, 4.0];
         let b = [2.0, 5.0, 3.0, 6.0, 2.5, 4.5];
         let (a, b) = (
-            mean_over_time(&days, &a, &a),
-            mean_over_time(&days[..6], &b, &b),
+            mean_over_time(&days, &a, (&a, 1)),
+            mean_over_time(&days[..6], &b, (&b, 1)),
         );
         let (error, p_value) = welch(&a, &b).unwrap();
         assert!(
             (error - WELCH.0).abs() < 1e-12 && (p_value.unwrap() - WELCH.1).abs() < 1e-9,
             "{error} {p_value:?}"
         );
+    }
+
+    /// Of two years' values less their twelve months' means 12 of 24 are left to tell their spread: noise has differences as often as chance says.
+    #[test]
+    fn means_that_were_taken_off_are_counted() {
+        let mut state = 5_u64;
+        let mut next = || {
+            state = state.wrapping_mul(25_214_903_917).wrapping_add(11) & ((1 << 48) - 1);
+            state as f64 / (1_u64 << 48) as f64
+        };
+        let periods = months(24);
+        let mut side = || {
+            let values: Vec<f64> = (0..24)
+                .map(|_| (0..12).map(|_| next()).sum::<f64>())
+                .collect();
+            let about = crate::analysis::climatology::deseasonalised(&periods, &values);
+            mean_over_time(&periods, &values, (&about, 12))
+        };
+        let (mut found, mut squares, mut told) = (0, 0.0, 0.0);
+        for _ in 0..1000 {
+            let (a, b) = (side(), side());
+            let (error, p_value) = welch(&a, &b).unwrap();
+            found += u32::from(p_value.unwrap() < 0.05);
+            squares += (a.mean.unwrap() - b.mean.unwrap()).powi(2);
+            told += error * error;
+        }
+        assert!((25..80).contains(&found), "{found} of 1000");
+        assert!((told / squares - 1.0).abs() < 0.2, "{told} {squares}");
+        // Of thirteen values less twelve means nothing is left that tells a spread of two.
+        let few = months(12);
+        let values: Vec<f64> = (0..12).map(f64::from).collect();
+        assert_eq!(mean_over_time(&few, &values, (&values, 12)).variance, None);
     }
 
     /// Error and chance.

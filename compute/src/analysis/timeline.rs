@@ -6,8 +6,18 @@ use super::line::Line;
 
 /// Milliseconds in a Julian year of 365.25 days.
 pub const YEAR_MS: f64 = 365.25 * 86_400_000.0;
-/// Share of a bin's time that must hold data for its mean to count.
-pub const LEAST_SHARE: f64 = 0.5;
+/// Share of a month's time, or of a shorter bin's, that must hold data for its mean to count.
+const LEAST_SHARE: f64 = 0.5;
+/// The same of seasons and years: what is missing of these is a part of the year, and their mean would have the rest of the season in it.
+const LEAST_SHARE_OF_LONG: f64 = 0.95;
+
+/// Share of the time of a bin of the calendar that must hold data for its mean to count.
+pub fn least_share(step: TimeStep) -> f64 {
+    match step {
+        TimeStep::Native | TimeStep::Day | TimeStep::Week | TimeStep::Month => LEAST_SHARE,
+        TimeStep::Season | TimeStep::Year | TimeStep::Total => LEAST_SHARE_OF_LONG,
+    }
+}
 
 /// Middles of periods, years of 365.25 days after the first one's.
 pub fn middles_years(periods: &[Period]) -> Vec<f64> {
@@ -31,6 +41,8 @@ pub fn means_over(periods: &[Period], values: &[f64], step: TimeStep) -> (Vec<Pe
 pub struct Bins {
     bins: Vec<Period>,
     steps: Steps,
+    /// That of [`least_share`].
+    least_share: f64,
 }
 
 #[derive(Debug)]
@@ -52,6 +64,7 @@ impl Bins {
             return Self {
                 bins: line.steps.clone(),
                 steps: Steps::Native(line),
+                least_share: least_share(step),
             };
         }
         let bins = bins_over(periods, step);
@@ -70,7 +83,11 @@ impl Bins {
             inside.push((from, shared_s.collect()));
         }
         let steps = Steps::Inside(inside);
-        Self { bins, steps }
+        Self {
+            bins,
+            steps,
+            least_share: least_share(step),
+        }
     }
 
     /// The bins.
@@ -89,7 +106,7 @@ impl Bins {
         bins.map(|(bin, (from, shared_s))| (*bin, *from, &shared_s[..]))
     }
 
-    /// Means over the bins, NaN where less than half of a bin's time holds data: each step counts by the time of it that lies
+    /// Means over the bins, NaN where less of a bin's time holds data than [`least_share`]: each step counts by the time of it that lies
     /// in the bin. `values` are one for each step, NaN no data, any unit.
     pub fn means(&self, values: &[f64]) -> Vec<f64> {
         let inside = match &self.steps {
@@ -104,7 +121,7 @@ impl Bins {
                     with_data_s += shared_s;
                 }
             }
-            let is_held = with_data_s >= LEAST_SHARE * bin.seconds();
+            let is_held = with_data_s >= self.least_share * bin.seconds();
             if is_held { sum / with_data_s } else { f64::NAN }
         };
         self.bins.iter().zip(inside).map(mean).collect()
@@ -164,6 +181,24 @@ mod tests {
         assert!((means[4] - 3.0).abs() < 1e-12);
         let (years, means) = means_over(&periods, &values, TimeStep::Year);
         assert_eq!((years.len(), means[0].is_nan()), (1, true));
+        // Of eleven months a year has no mean: what is missing is a part of its season. Of all days but ten it has.
+        let year: Vec<Period> = (1..=12)
+            .map(|month| Period::month(2001, month).unwrap())
+            .collect();
+        let eleven: Vec<f64> = (0..12)
+            .map(|m| if m == 6 { f64::NAN } else { 1.0 })
+            .collect();
+        assert!(means_over(&year, &eleven, TimeStep::Year).1[0].is_nan());
+        let (seasons, means) = means_over(&year, &eleven, TimeStep::Season);
+        assert_eq!(seasons.len(), 5);
+        let is_held: Vec<bool> = means.iter().map(|mean| !mean.is_nan()).collect();
+        // January and February are two months of a winter, December one of the next.
+        assert_eq!(is_held, [false, true, false, true, false]);
+        let days: Vec<Period> = TimeStep::Day.whole_bins(Period::year(2001).unwrap());
+        let most: Vec<f64> = (0..365)
+            .map(|d| if d % 36 == 5 { f64::NAN } else { 1.0 })
+            .collect();
+        assert!((means_over(&days, &most, TimeStep::Year).1[0] - 1.0).abs() < 1e-12);
         let (as_they_are, _) = means_over(&periods, &values, TimeStep::Native);
         assert_eq!(as_they_are, periods);
         assert_eq!(means_over(&[], &[], TimeStep::Month).0.len(), 0);

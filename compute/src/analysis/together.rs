@@ -1,5 +1,7 @@
 //! What is made of two series: their correlation at lags, and the difference of their means.
 
+use std::collections::BTreeSet;
+
 use contract::ContractError;
 use contract::analysis::{
     CalendarBins, Correlation, CorrelationQuery, Difference, DifferenceSide, SeriesQuery,
@@ -184,12 +186,16 @@ fn of_seasons(sides: [(&ReadSeries, &MeanOverTime); 2]) -> Vec<String> {
 
 /// Mean of a side, its error by the spread about the mean of each month where there are two years of them.
 fn of_side(series: &ReadSeries) -> MeanOverTime {
-    let about = if has_seasons(series) {
-        deseasonalised(&series.periods, &series.values)
-    } else {
-        series.values.clone()
-    };
-    mean_over_time(&series.periods, &series.values, &about)
+    let (periods, values) = (&series.periods, &series.values);
+    if !has_seasons(series) {
+        return mean_over_time(periods, values, (values, 1));
+    }
+    let about = deseasonalised(periods, values);
+    let here = periods.iter().zip(values).filter(|(_, v)| !v.is_nan());
+    let months: BTreeSet<usize> = here
+        .map(|(period, _)| CalendarBins::Month.of(*period))
+        .collect();
+    mean_over_time(periods, values, (&about, months.len()))
 }
 
 fn side(series: ReadSeries, mean: &MeanOverTime) -> DifferenceSide {

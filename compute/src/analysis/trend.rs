@@ -21,13 +21,15 @@ const WHAT: &str = "a trend";
 pub const LEAST_YEARS: f64 = 5.0;
 /// Rounding of the years between two middles: of five years of months 4 years and 11 months lie between them.
 const MONTH_YEARS: f64 = 0.09;
+/// Shortest three months, s: of two steps that are shorter both may lie in one season.
+const LEAST_SEASON_S: f64 = 88.0 * 86_400.0;
 /// Years in a decade.
 const DECADE: f64 = 10.0;
 
 /// The trend of a series through means of `step`, or through steps as they are where those are longer.
 ///
-/// `periods` are in the order of time, `values` beside them in `unit`, NaN no data. Where steps are no longer than months the
-/// season is taken off first: the mean of each calendar month, found together with a line.
+/// `periods` are in the order of time, `values` beside them in `unit`, NaN no data. Where steps are no longer than months, or are seasons, the
+/// season is taken off first: the mean of each calendar month or season, found together with a line.
 ///
 /// # Errors
 /// Fewer than ten values or five years, more than 12 000 values, or all equal.
@@ -45,8 +47,8 @@ pub fn trend(
 pub struct TrendSteps {
     step: TimeStep,
     bins: Bins,
-    /// Calendar month of each bin, from 0; none where bins are longer.
-    months: Option<Vec<usize>>,
+    /// Calendar month or season of each bin, from 0; none where bins are longer.
+    parts: Option<Vec<usize>>,
     /// Middle of each bin, years after the first one's.
     years: Vec<f64>,
 }
@@ -57,11 +59,9 @@ impl TrendSteps {
         let step = no_shorter(periods, step);
         let bins = Bins::over(periods, step);
         let own = bins.periods();
-        let has_seasons = longest_s(own) <= CalendarBins::Month.longest_step_s();
-        let months = has_seasons.then(|| months_of(own));
         Self {
             step,
-            months,
+            parts: parts_of_year(own),
             years: middles_years(own),
             bins,
         }
@@ -101,7 +101,7 @@ impl TrendSteps {
         Ok(Trend {
             slope_unit: format!("{unit} per decade").trim_start().to_owned(),
             step: self.step,
-            deseasonalised: self.months.is_some(),
+            deseasonalised: self.parts.is_some(),
             count: here.len() as u64,
             years: basis.spanned_years,
             mid: TimeMs::new(mid_ms).unwrap_or_else(|_| periods[0].mid()),
@@ -150,11 +150,11 @@ impl TrendSteps {
         let means = self.bins.means(values);
         let here: Vec<usize> = (0..means.len()).filter(|i| !means[*i].is_nan()).collect();
         let spanned_years = years_of(self.bins.periods(), &means, &here)?;
-        let months = self.months.as_ref();
-        let season = months.map(|months| Seasonless::of(months, &self.years, &means));
+        let parts = self.parts.as_ref();
+        let season = parts.map(|parts| Seasonless::of(parts, &self.years, &means));
         if let Some(season) = &season {
-            // Each month's own mean takes a value, and a line two.
-            let needed = season.month_count + 3;
+            // The mean of each part of the year takes a value, and a line two.
+            let needed = season.part_count + 3;
             if here.len() < needed {
                 return Err(Undefined::TooFew {
                     what: "a trend beside a season",
@@ -178,6 +178,20 @@ impl TrendSteps {
     }
 }
 
+/// The calendar month of each bin, or its season where all are as long as one; none where they are longer.
+fn parts_of_year(bins: &[Period]) -> Option<Vec<usize>> {
+    if longest_s(bins) <= CalendarBins::Month.longest_step_s() {
+        return Some(months_of(bins));
+    }
+    let season = |period: &Period| CalendarBins::Season.of(*period);
+    let is_season = |period: &Period| {
+        (LEAST_SEASON_S..=CalendarBins::Season.longest_step_s()).contains(&period.seconds())
+    };
+    bins.iter()
+        .all(is_season)
+        .then(|| bins.iter().map(season).collect())
+}
+
 /// A series that slopes are sought in.
 struct Basis {
     /// Bins with data.
@@ -186,7 +200,7 @@ struct Basis {
     means: Vec<f64>,
     /// The same, seasons off, rising as they do.
     values: Vec<f64>,
-    /// What was taken off, and the same not rising by it; none where bins are longer than months.
+    /// What was taken off, and the same not rising by it; none where bins are longer than seasons.
     season: Option<Seasonless>,
     /// Middles of the bins with data, years.
     years_here: Vec<f64>,
@@ -219,7 +233,7 @@ impl Basis {
         Ok((slopes, slope, mann_kendall(tested, &detrended)?))
     }
 
-    /// How many times as large the variance of a slope is as without means of months beside it: times vary by less beside them, and each takes a
+    /// How many times as large the variance of a slope is as without means of parts of the year beside it: times vary by less beside them, and each takes a
     /// part of the scatter.
     fn less_known(&self) -> f64 {
         let Some(season) = self.season.as_ref().filter(|own| own.squared_years > 0.0) else {
@@ -228,7 +242,7 @@ impl Basis {
         let middle = mean(&self.years_here).unwrap_or_default();
         let squares = self.years_here.iter().map(|x| (x - middle).powi(2));
         let count = self.values_here.len() as f64;
-        let scatter = (count - 2.0) / (count - season.month_count as f64 - 1.0);
+        let scatter = (count - 2.0) / (count - season.part_count as f64 - 1.0);
         squares.sum::<f64>() / season.squared_years * scatter
     }
 }

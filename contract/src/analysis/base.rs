@@ -54,6 +54,11 @@ impl BasePeriod {
         }
     }
 
+    /// Its years.
+    pub fn years(self) -> std::ops::RangeInclusive<i32> {
+        self.0[0]..=self.0[1]
+    }
+
     /// The year in its middle, the earlier of two.
     pub fn middle_year(self) -> i32 {
         self.0[0] + (self.0[1] - self.0[0]) / 2

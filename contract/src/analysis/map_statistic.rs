@@ -41,7 +41,7 @@ pub enum MapStatistic {
     Phase,
     /// Slope of Theil and Sen through the means of months, their calendar months' means taken off.
     Trend,
-    /// Chance of a score of Mann and Kendall as far from none where there is no trend, its variance corrected after Hamed and Rao.
+    /// Chance of a score of Mann and Kendall as far from none where there is no trend, its variance corrected after Hamed and Rao and after Yue and Wang.
     TrendPValue,
     /// Slope of the line of least squares through the same means.
     LeastSquaresTrend,

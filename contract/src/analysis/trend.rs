@@ -5,15 +5,15 @@ use utoipa::ToSchema;
 
 use crate::time::{TimeMs, TimeStep};
 
-/// Trends of a series. Where steps are shorter than a year, the mean of each calendar month is taken off first, so that a
+/// Trends of a series. Where steps are shorter than a year, the mean of each calendar month, or season, is taken off first, so that a
 /// season that begins or ends early is no trend.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Trend {
     /// Unit of every slope.
     pub slope_unit: String,
-    /// Means that it is drawn through; of months and years those that hold data over half of their time.
+    /// Means that it is drawn through; of months those that hold data over half of their time, of seasons and years over 95 % of it.
     pub step: TimeStep,
-    /// Was the mean of each calendar month taken off first?
+    /// Was the mean of each calendar month, or season, taken off first?
     pub deseasonalised: bool,
     /// Number of values.
     pub count: u64,
@@ -83,7 +83,8 @@ pub struct TheilSenTrend {
 }
 
 /// The test of Mann and Kendall, its variance corrected for autocorrelation (Hamed and Rao 1998,
-/// doi:10.1016/S0022-1694(97)00125-X): over all lags at which the ranks of the detrended values are correlated beyond 95 % of chance.
+/// doi:10.1016/S0022-1694(97)00125-X), with that of the ranks of the detrended values from one step to the next, where it is beyond 95 % of chance, and its
+/// powers at longer lags (Yue and Wang 2004, doi:10.1023/B:WARM.0000043140.61082.60).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct MannKendall {
     /// Pairs that rise less pairs that fall.

@@ -30,7 +30,7 @@ pub(crate) struct Analysis {
     #[arg(long, help_heading = HEADING)]
     anomaly: bool,
     /// Least-squares and Theil-Sen slopes with intervals of 95 %, and the test of Mann and Kendall; all allow for
-    /// autocorrelation (effective number of values; Hamed and Rao 1998). Needs five years.
+    /// autocorrelation (effective number of values; Hamed and Rao 1998 with that of neighbouring steps). Needs five years.
     #[arg(long, help_heading = HEADING)]
     trend: bool,
     /// Amplitude and phase of the year and the half-year.

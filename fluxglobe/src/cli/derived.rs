@@ -20,9 +20,10 @@ How two products go together in each cell, over the months that both have:
 
 makes sst-correlation-wind and so on, each cell what `fluxglobe stats correlate --at` says of it:
 Pearson's r, -1 to 1; p by effective pairs, which allow for autocorrelation (Bretherton et al.
-1999); pairs of months, each of which holds data in half of its time. Seasons alone make most
-pairs of products go together: --deseasonalise takes them off first. With --lag 2 the second is
-read two months after the first, with --lag=-2 before it; give maps of several lags a --name each.
+1999); pairs of months, each of which holds data in half of its time (of seasons and years in 95 %
+of it). Seasons alone make most pairs of products go together: --deseasonalise takes them off
+first. With --lag 2 the second is read two months after the first, with --lag=-2 before it; give
+maps of several lags a --name each.
 Both lie on one grid: `fluxglobe derive regrid` brings one to that of the other.
 
 What a statistic was made from and how it was asked for is in its manifest (`computed`). When there
@@ -42,7 +43,7 @@ pub(crate) struct DeriveStatistic {
     /// min-time and max-time (when), count and coverage (steps and share of the time with data), spread (standard deviation),
     /// climatology (a step a month or season), anomaly (every step, or every mean of a --step, less the climatology), amplitude and
     /// phase of the year's wave,
-    /// trend (Theil-Sen), trend-p-value (Mann-Kendall, Hamed-Rao), least-squares-trend, least-squares-trend-p-value; together with
+    /// trend (Theil-Sen), trend-p-value (Mann-Kendall, Hamed-Rao with the autocorrelation of neighbouring steps), least-squares-trend, least-squares-trend-p-value; together with
     /// the product --with: correlation, correlation-p-value, correlation-pairs, correlation-effective-pairs.
     #[arg(long, value_name = "NAME,...", value_delimiter = ',', required = true)]
     pub(crate) statistic: Vec<MapStatistic>,

@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use contract::analysis::{SeriesAnalysis, Trend};
-use contract::time::TimeMs;
+use contract::time::{TimeMs, TimeStep};
 use plotters::prelude::{Color as _, LineSeries, PathElement, Polygon, RGBColor};
 
 use super::chart::{Point, axis_of, below_legend, chart, label, legend, lines, period, place};
@@ -19,7 +19,10 @@ pub(super) fn of_trend(answer: &SeriesAnalysis) -> Result<String> {
         "through values of step {}{}; bands are the 95 % intervals of the slopes",
         trend.step,
         if trend.deseasonalised {
-            ", the mean of each calendar month taken off"
+            match trend.step {
+                TimeStep::Season => ", the mean of each season taken off",
+                _ => ", the mean of each calendar month taken off",
+            }
         } else {
             ""
         }

@@ -3,6 +3,7 @@
 //!
 //! Several statistics of a cell share what they have in common: a trend, its test, its season and its correlation are worked out once.
 
+use std::collections::BTreeSet;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -161,11 +162,11 @@ struct OfCell {
     periods: Vec<Period>,
     /// Bin of each of them, or of each mean.
     bin_of: Vec<usize>,
-    /// Steps, or means, of each bin.
-    steps_of: Vec<usize>,
+    /// Steps, or means, of each bin that there would be if none of a year that was asked for were missing.
+    steps_of: Vec<f64>,
     /// Seconds of each step that is read.
     seconds: Vec<f64>,
-    /// Of all of them.
+    /// From the first of them to the last: what never landed is time without data.
     all_s: f64,
     /// For trends.
     trend_steps: Option<Arc<TrendSteps>>,
@@ -177,17 +178,22 @@ impl OfCell {
     fn new(plan: &Plan, periods: &[Period]) -> Self {
         let periods = periods[plan.read.clone()].to_vec();
         let bin_of = |period: Period| plan.parts.of_period(period);
-        let bin_of: Vec<usize> = match &plan.normals_of {
-            None => periods.iter().map(|period| bin_of(*period)).collect(),
-            Some(means) => means.iter().map(|mean| bin_of(mean.period)).collect(),
+        let each: Vec<Period> = match &plan.normals_of {
+            None => periods.clone(),
+            Some(means) => means.iter().map(|mean| mean.period).collect(),
         };
-        let mut steps_of = vec![0; plan.parts.count()];
-        for bin in &bin_of {
-            steps_of[*bin] += 1;
-        }
+        let bin_of: Vec<usize> = each.iter().map(|period| bin_of(*period)).collect();
         let seconds: Vec<f64> = periods.iter().map(|period| period.seconds()).collect();
+        let ends = periods.first().zip(periods.last());
         Self {
-            all_s: seconds.iter().fold(0.0, |all, own| all + own),
+            all_s: ends.map_or(0.0, |(first, last)| {
+                Period {
+                    start: first.start,
+                    end: last.end,
+                }
+                .seconds()
+            }),
+            steps_of: steps_of(plan, &each, &bin_of),
             seconds,
             trend_steps: None,
             pairs: None,
@@ -201,7 +207,6 @@ impl OfCell {
             },
             periods,
             bin_of,
-            steps_of,
         }
     }
 
@@ -255,7 +260,7 @@ impl OfCell {
         value.unwrap_or(f64::NAN)
     }
 
-    /// Share of the time of all steps that holds data.
+    /// Share of the time from the first step to the last that holds data.
     fn time_share(&self, values: &[f32]) -> f64 {
         let mut with_data_s = 0.0;
         for (seconds, value) in self.seconds.iter().zip(values) {
@@ -284,7 +289,7 @@ impl OfCell {
             counts[*bin] += 1;
         }
         for ((sum, count), all) in out.iter_mut().zip(&counts).zip(&self.steps_of) {
-            let is_held = *count > 0 && *count as f64 >= self.least_share * *all as f64;
+            let is_held = *count > 0 && *count as f64 >= self.least_share * all;
             *sum = if is_held {
                 *sum / *count as f64
             } else {
@@ -384,6 +389,27 @@ impl OfCell {
         });
         found.map(|(value, _)| f64::from(*value))
     }
+}
+
+/// Steps of each bin of some periods, in whose bins they lie; of a base period that was asked for as many as there would be if there were some in each of
+/// its years that has the bin.
+fn steps_of(plan: &Plan, periods: &[Period], bin_of: &[usize]) -> Vec<f64> {
+    let mut steps_of = vec![0.0; plan.parts.count()];
+    let mut years_of = vec![BTreeSet::new(); plan.parts.count()];
+    for (period, bin) in periods.iter().zip(bin_of) {
+        steps_of[*bin] += 1.0;
+        years_of[*bin].insert(period.mid().year_month().0);
+    }
+    let Some(base) = plan.base else {
+        return steps_of;
+    };
+    for (bin, (steps, years)) in steps_of.iter_mut().zip(&years_of).enumerate() {
+        let wanted = base
+            .years()
+            .filter(|year| plan.parts.is_in_year(bin, *year));
+        *steps *= wanted.count() as f64 / years.len().max(1) as f64;
+    }
+    steps_of
 }
 
 fn as_f64(values: &[f32]) -> Vec<f64> {

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use contract::time::{Period, TimeStep};
 
-use crate::analysis::timeline::{Bins, LEAST_SHARE};
+use crate::analysis::timeline::{Bins, least_share};
 
 /// A mean of steps that follow each other, each by the time of it that lies in the mean's; of a step that is taken as it is its value.
 #[derive(Debug, Clone, PartialEq)]
@@ -76,12 +76,12 @@ impl MeanOf {
     }
 }
 
-/// Means over whole bins of the calendar, of steps in the order of time: as trends are drawn through, so that half of a bin's time
-/// must hold data. Bins that steps cover less of are left out: no cell has a mean there.
+/// Means over whole bins of the calendar, of steps in the order of time: as trends are drawn through, with as much of a bin's time
+/// that must hold data. Bins that steps cover less of are left out: no cell has a mean there.
 pub(super) fn over(periods: &[Period], step: TimeStep) -> Vec<MeanOf> {
     let bins = Bins::over(periods, step);
     let mean = |(period, from, shared_s): (Period, usize, &[f64])| {
-        let least_s = LEAST_SHARE * period.seconds();
+        let least_s = least_share(step) * period.seconds();
         let covered_s: f64 = shared_s.iter().sum();
         (covered_s >= least_s).then(|| MeanOf {
             period,

@@ -3,6 +3,11 @@
 use contract::analysis::{CalendarBins, MapOptions};
 use contract::time::{Period, TimeStep};
 
+/// Title of the day that not every year has.
+const LEAP_DAY: &str = "29 February";
+/// 28 days, s.
+const LONGEST_SHORT_FEBRUARY_S: f64 = 28.0 * 86_400.0;
+
 /// What the steps, or the means, that one normal is made of have in common.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum PartsOfYear {
@@ -27,6 +32,16 @@ impl PartsOfYear {
         match self {
             Self::Bins(bins) => bins.count(),
             Self::Whole => 1,
+        }
+    }
+
+    /// Has a year this part? 29 February few have.
+    pub(super) fn is_in_year(self, part: usize, year: i32) -> bool {
+        match self {
+            Self::Bins(CalendarBins::Day) if CalendarBins::Day.title(part) == LEAP_DAY => {
+                Period::month(year, 2).is_ok_and(|month| month.seconds() > LONGEST_SHORT_FEBRUARY_S)
+            }
+            Self::Bins(_) | Self::Whole => true,
         }
     }
 

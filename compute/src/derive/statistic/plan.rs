@@ -28,12 +28,14 @@ use crate::analysis::timeline::longest_s;
 /// Version of the way a statistic is made: it changes when its bits do.
 fn method(statistic: MapStatistic) -> u32 {
     match statistic {
-        // Means of months are found together with a line since.
+        // Means of months are found together with a line since 2; means of seasons too, and autocorrelation is that from step to step, since 3.
         MapStatistic::Trend
         | MapStatistic::TrendPValue
         | MapStatistic::LeastSquaresTrend
-        | MapStatistic::LeastSquaresTrendPValue => 2,
-        _ => 1,
+        | MapStatistic::LeastSquaresTrendPValue => 3,
+        // Seasons and years have means where nearly all of their time holds data, waves where data lie all the year round, and steps that never
+        // landed are time without data, since 2.
+        _ => 2,
     }
 }
 
@@ -79,6 +81,8 @@ pub(super) struct Plan {
     pub(super) read: Range<usize>,
     /// Means that the normals of anomalies are made of; none where steps are taken as they are.
     pub(super) normals_of: Option<Arc<[MeanOf]>>,
+    /// Years that normals were asked to stand for; none where they are those of what there is.
+    pub(super) base: Option<BasePeriod>,
     /// What each anomaly is of, one for each output; nothing of other statistics.
     pub(super) anomalies_of: Arc<[MeanOf]>,
     pub(super) outputs: Vec<Output>,
@@ -139,6 +143,7 @@ impl Plan {
             pairs,
             read: ranges.read,
             normals_of: ranges.normals_of,
+            base: options.base.filter(|_| options.statistic.has_bins()),
             anomalies_of: ranges.anomalies_of,
             quantity,
             factor,

@@ -6,6 +6,7 @@ use contract::analysis::{
     Anomalies, Climatology, Correlation, Difference, Extremes, Harmonic, Hovmoller, HovmollerRow,
     Season, SeriesAnalysis, SeriesPlace, Trend,
 };
+use contract::time::TimeStep;
 
 use crate::progress;
 
@@ -139,10 +140,10 @@ fn trend(made: &Trend, unit: &str) -> String {
             ),
         ],
     ];
-    let seasons = if made.deseasonalised {
-        "mean of each calendar month taken off"
-    } else {
-        "values as they are"
+    let seasons = match made.step {
+        _ if !made.deseasonalised => "values as they are",
+        TimeStep::Season => "mean of each season taken off",
+        _ => "mean of each calendar month taken off",
     };
     let header = [
         "trend",
