@@ -1,9 +1,12 @@
 //! What is made of series: pure functions over periods with values beside them, and the questions that read those from products.
 //!
 //! Pure: `climatology`, `linear_trend`, `theil_sen`, `mann_kendall`, `trend`, `harmonics`, `extremes`, `common_steps`,
-//! `correlation`, `mean_difference`, `bands`, and what they share. Asked of products: `of_series`, `together`, `hovmoller`.
+//! `correlation`, `mean_difference`, `bands`, and what they share. Asked of products: `of_series`, `together`, `hovmoller`, whose bands
+//! `banded` makes of a box or of polygons.
 
 pub mod autocorrelation;
+mod band_shares;
+mod banded;
 pub mod bands;
 pub mod climatology;
 pub mod common_steps;

@@ -56,7 +56,7 @@ impl Region {
     /// A box with `west` wrapped into [-180, 180) and `east` above it.
     ///
     /// # Errors
-    /// Not finite, latitudes past a pole or not rising, or no width.
+    /// Not finite, latitudes past a pole or not rising, no width, or more of it than once around.
     pub fn new_box(west: f64, south: f64, east: f64, north: f64) -> Result<Self, ContractError> {
         let bad = |reason: &str| {
             Err(ContractError::invalid(
@@ -74,6 +74,14 @@ impl Region {
         if south >= north || south < -90.0 || north > 90.0 {
             return bad("latitudes must rise from south to north within -90 to 90");
         }
+        // Edges that are sums have the noise of sums.
+        let asked_deg = crate::grid::rounded_deg(east - west);
+        if asked_deg > 360.0 {
+            let reason = format!(
+                "it is {asked_deg} degrees wide: a box goes once around at most, its east is at most its west + 360"
+            );
+            return bad(&reason);
+        }
         let width = if east - west >= 360.0 {
             360.0
         } else {
@@ -89,27 +97,6 @@ impl Region {
             east: west + width,
             north,
         })
-    }
-
-    /// West, south, east, north of a box, degrees; none of the whole globe.
-    ///
-    /// # Errors
-    /// Polygons.
-    pub fn as_box(&self) -> Result<Option<[f64; 4]>, ContractError> {
-        match self {
-            Self::Global => Ok(None),
-            Self::Box {
-                west,
-                south,
-                east,
-                north,
-            } => Ok(Some([*west, *south, *east, *north])),
-            Self::Polygons(_) => Err(ContractError::invalid(
-                "region",
-                "a polygon",
-                "bands of latitude or longitude need a box, west,south,east,north in degrees",
-            )),
-        }
     }
 }
 
@@ -173,6 +160,20 @@ mod tests {
                 north: 10.0
             }
         );
+    }
+
+    #[test]
+    fn a_box_that_goes_around_more_than_once_is_refused_with_its_width() {
+        for (text, width) in [("0,-10,400,10", "400"), ("-180,-90,180.5,90", "360.5")] {
+            let refused = text.parse::<Region>().unwrap_err().to_string();
+            let told = format!("it is {width} degrees wide: a box goes once around");
+            assert!(refused.contains(&told), "{refused}");
+        }
+        // 0.1 and 360 have a sum that lies further than 360 from 0.1.
+        for west in [0.1, -179.9, 33.3] {
+            let region = Region::new_box(west, -1.0, west + 360.0, 1.0).unwrap();
+            assert!(matches!(region, Region::Box { west, east, .. } if east - west > 359.9));
+        }
     }
 
     #[test]

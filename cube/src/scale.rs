@@ -132,7 +132,7 @@ impl Scale {
         sum as f64 / weight as f64 / self.steps_per_value()
     }
 
-    /// Standard deviation of the population, stored unit.
+    /// Standard deviation of the population, √(Σ w (x - m)² / Σ w), stored unit.
     pub fn std(self, squares: i128, sum: i128, weight: i128) -> f64 {
         let of_squares = squares as f64 / weight as f64 * self.unit() * self.unit()
             / f64::from(SQUARE_BITS).exp2();

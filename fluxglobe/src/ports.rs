@@ -196,17 +196,19 @@ impl Analyse for Analyst {
                     .await
                     .map(MadeOfSeries::Correlation)
             }
-            SeriesQuestion::Difference { of, minus } => {
+            SeriesQuestion::Difference {
+                of,
+                minus,
+                min_coverage,
+            } => {
                 let (a, b) = ((parts(&of.0), &of.1), (parts(&minus.0), &minus.1));
-                difference(self.reader(&of.1), a, b)
+                difference(self.reader(&of.1), a, b, *min_coverage)
                     .await
                     .map(MadeOfSeries::Difference)
             }
-            SeriesQuestion::Hovmoller { of, query } => {
-                hovmoller(self.local.store(), parts(of), query)
-                    .await
-                    .map(MadeOfSeries::Hovmoller)
-            }
+            SeriesQuestion::Hovmoller { of, query } => hovmoller(&self.regions, parts(of), query)
+                .await
+                .map(MadeOfSeries::Hovmoller),
         };
         made.map_err(compute_failed)
     }
@@ -325,6 +327,7 @@ mod tests {
     use std::num::NonZeroUsize;
     use std::sync::Arc;
 
+    use contract::analysis::{Along, HovmollerWishes};
     use contract::digest::Digest;
     use contract::earth::Earth;
     use contract::grid::Grid;
@@ -450,6 +453,19 @@ mod tests {
                 ..RegionSeriesQuery::new(flux.product.clone(), region.parse().unwrap())
             };
             analyst.area(&flux, &query).await.unwrap();
+            let triangle = format!("POLYGON(({i} 0,{}.5 0,{i} 30,{i} 0))", i + 30);
+            let wishes = HovmollerWishes {
+                region: triangle.parse().ok(),
+                ..HovmollerWishes::default()
+            };
+            let bands = SeriesQuestion::Hovmoller {
+                of: Version {
+                    manifest: Arc::clone(&flux),
+                    id: flux.id(),
+                },
+                query: wishes.query(flux.product.clone(), Along::Lat),
+            };
+            analyst.made_of_series(&bands).await.unwrap();
         }
         assert_eq!(store.list("").await.unwrap(), before);
     }

@@ -52,6 +52,10 @@ fn a_code_of_a_mask_is_a_region_by_its_number_and_by_what_it_means() {
             "stats difference --product flux --minus flux@1",
             "difference?minus=flux&minus_manifest=flux@1",
         ),
+        (
+            "stats hovmoller --product flux --along lon --band 30",
+            "hovmoller?along=lon&band=30",
+        ),
     ] {
         let of = |region: &str| {
             let words = [&words(command)[..], &["--region", region, "--json"]].concat();

@@ -256,6 +256,18 @@ fn made_of_series(data: &Path, server: &Server) {
             "stats hovmoller --product flux --along lat --band 20 --region -30,-60,30,60",
             "flux/hovmoller?along=lat&band=20&region=-30,-60,30,60",
         ),
+        (
+            "stats hovmoller --product flux --along lon --band 20 --region equatorial-pacific --step total --min-coverage 30",
+            "flux/hovmoller?along=lon&band=20&region=equatorial-pacific&step=total&min_coverage=30",
+        ),
+        (
+            "stats correlate --product flux --product flux --region 14n-50n --min-coverage 30",
+            "flux/correlation?with=flux&region=14n-50n&min_coverage=30",
+        ),
+        (
+            "stats difference --product flux --region global --minus-period 1999/2001 --min-coverage 30",
+            "flux/difference?region=global&minus_period=1999/2001&min_coverage=30",
+        ),
     ] {
         let words: Vec<&str> = words.split_whitespace().chain(["--json"]).collect();
         let printed = program::json(data, &words).unwrap();

@@ -23,7 +23,7 @@ use contract::observation::{Filter, Page, Platform, TrackPoint, TrackQuery};
 use contract::region::{AskedRegion, MaskCode};
 use contract::rows::{Columns, RowsForm};
 use contract::series::{PointSeries, RegionSeries, RegionSeriesQuery};
-use contract::statistics::{StatisticsAnswer, StatisticsQuery};
+use contract::statistics::{MinCoverage, StatisticsAnswer, StatisticsQuery};
 use serde::Serialize;
 use tokio::sync::OwnedSemaphorePermit;
 
@@ -110,6 +110,8 @@ pub enum SeriesQuestion {
         of: (Version, SeriesQuery),
         /// The other.
         minus: (Version, SeriesQuery),
+        /// Least share of a region's sea, or of a line, that a step of either must hold data over.
+        min_coverage: MinCoverage,
     },
     /// Latitude or longitude against time.
     Hovmoller {

@@ -57,6 +57,7 @@ const RETRY_AFTER: &str = "Seconds after which the same request may succeed";
         difference::get,
         difference::post,
         hovmoller::get,
+        hovmoller::post,
         budget::get,
         budget::post,
         budget::history,

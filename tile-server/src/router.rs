@@ -78,6 +78,10 @@ fn of_geometries() -> Router<AppState> {
             get(difference::get).post(difference::post),
         )
         .route(
+            "/api/products/{product}/hovmoller",
+            get(hovmoller::get).post(hovmoller::post),
+        )
+        .route(
             "/api/products/{product}/budget",
             get(budget::get).post(budget::post),
         )
@@ -118,7 +122,6 @@ pub fn router(state: AppState) -> Router {
         .route("/stream", get(stream::get))
         .route("/api/products", get(products::list))
         .route("/api/products/{product}/point", get(point::get))
-        .route("/api/products/{product}/hovmoller", get(hovmoller::get))
         .route("/api/products/{product}/{legend_file}", get(legend::get))
         .route("/api/regions", get(regions::list))
         .route("/api/palettes", get(palettes::list))

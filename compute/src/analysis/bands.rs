@@ -7,11 +7,13 @@ use contract::chunk::Window;
 use contract::earth::Earth;
 use contract::grid::Grid;
 
+use super::band_shares::{BandShares, CellArea, Touched};
+
 /// Rounding of band's edges, in bands.
 const EDGE_SLACK: f64 = 1e-9;
 
 /// The bands of a grid: which cells lie in which.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Bands {
     /// What they lie along.
     along: Along,
@@ -21,10 +23,29 @@ pub struct Bands {
     cols: Vec<bool>,
     /// Band of each row, or of each column.
     band_of: Vec<Option<usize>>,
-    /// Area of a cell of each row, m².
-    area_m2: Vec<f64>,
+    areas: Areas,
     /// Lower and upper edges, degrees.
     edges_deg: Vec<(f64, f64)>,
+}
+
+/// What counts of cells.
+#[derive(Debug, Clone)]
+enum Areas {
+    /// All of them: area of a cell of each row, m².
+    Whole(Vec<f64>),
+    /// A region's share of each.
+    Shares(BandShares),
+}
+
+/// Areas of a band, m².
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct BandAreas {
+    /// Of what counts of all its cells.
+    pub all_m2: f64,
+    /// Of those cells that are some of the grid's.
+    pub some_m2: f64,
+    /// Of what counts for coverage of all its cells.
+    pub covered_m2: f64,
 }
 
 /// Sum of a band.
@@ -34,6 +55,8 @@ pub struct BandSum {
     pub weighted: f64,
     /// Area of cells with data, m².
     pub area_m2: f64,
+    /// What counts of it for coverage, m²: all of it of whole cells, the sea in it of a region's shares.
+    pub covered_m2: f64,
     /// Squares of how far values are from their mean, by area; 0 where they are not asked for.
     pub squares: f64,
 }
@@ -52,6 +75,7 @@ impl BandSum {
         self.squares += step.squares * seconds;
         self.weighted += step.weighted * seconds;
         self.area_m2 += more;
+        self.covered_m2 += step.covered_m2 * seconds;
     }
 
     /// Mean of the values; none without any.
@@ -59,7 +83,7 @@ impl BandSum {
         (self.area_m2 > 0.0).then(|| self.weighted / self.area_m2)
     }
 
-    /// Their standard deviation, where squares were asked for; none without any.
+    /// Their standard deviation √(Σ w (x - m)² / Σ w), where squares were asked for; none without any.
     pub fn std(&self) -> Option<f64> {
         (self.area_m2 > 0.0).then(|| (self.squares / self.area_m2).sqrt())
     }
@@ -75,22 +99,43 @@ impl Bands {
         earth: Earth,
     ) -> Self {
         let [west, south, east, north] = bounds_deg;
-        let middle_lat = |row: u32| 0.5 * (grid.row_north_deg(row) + grid.row_north_deg(row + 1));
-        let is_inside = |row: &u32| (south..=north).contains(&middle_lat(*row));
+        let is_inside = |row: &u32| (south..=north).contains(&middle_lat(grid, *row));
         let rows: Vec<u32> = (0..grid.rows).filter(is_inside).collect();
         let rows = rows.first().map_or(0, |row| *row)..rows.last().map_or(0, |row| row + 1);
-        // East of west, so that bands do not break at the date line.
-        let middle_lon = |col: u32| {
-            let middle = grid.col_west_deg(col) + 0.5 * grid.dlon_deg;
-            west + (middle - west).rem_euclid(360.0)
-        };
-        let cols: Vec<bool> = (0..grid.cols).map(|col| middle_lon(col) <= east).collect();
+        let cols: Vec<bool> = (0..grid.cols)
+            .map(|col| middle_lon(grid, west, col) <= east)
+            .collect();
+        let areas = (0..grid.rows).map(|row| grid.cell_area_m2(row, earth));
+        let areas = Areas::Whole(areas.collect());
+        Self::of_cells(grid, along, band_deg, (west, rows, cols), areas)
+    }
+
+    /// The same of a region's share of every cell, by the middles of whole cells.
+    pub(super) fn of_region(
+        grid: &Grid,
+        along: Along,
+        band_deg: f64,
+        (shares, touched): (BandShares, Touched),
+    ) -> Self {
+        let west = touched.bounds_deg[0];
+        let cells = (west, touched.rows, touched.cols);
+        Self::of_cells(grid, along, band_deg, cells, Areas::Shares(shares))
+    }
+
+    /// Those of some rows and columns, longitudes eastwards from `west`.
+    fn of_cells(
+        grid: &Grid,
+        along: Along,
+        band_deg: f64,
+        (west, rows, cols): (f64, Range<u32>, Vec<bool>),
+        areas: Areas,
+    ) -> Self {
         let middles: Vec<Option<f64>> = match along {
             Along::Lat => (0..grid.rows)
-                .map(|row| rows.contains(&row).then(|| middle_lat(row)))
+                .map(|row| rows.contains(&row).then(|| middle_lat(grid, row)))
                 .collect(),
             Along::Lon => (0..grid.cols)
-                .map(|col| cols[col as usize].then(|| middle_lon(col)))
+                .map(|col| cols[col as usize].then(|| middle_lon(grid, west, col)))
                 .collect(),
         };
         let number = |middle: f64| (middle / band_deg + EDGE_SLACK).floor();
@@ -111,9 +156,7 @@ impl Bands {
                 .iter()
                 .map(|middle| middle.map(|middle| (number(middle) - low) as usize))
                 .collect(),
-            area_m2: (0..grid.rows)
-                .map(|row| grid.cell_area_m2(row, earth))
-                .collect(),
+            areas,
             edges_deg: (0..count)
                 .map(|band| (edge(band), edge(band + 1)))
                 .collect(),
@@ -150,9 +193,10 @@ impl Bands {
     /// of rows and of columns in each, so that the same field has the same bits.
     pub fn sums(&self, windows: &[Window], values: &[Vec<f32>]) -> Vec<BandSum> {
         let mut sums = vec![BandSum::default(); self.edges_deg.len()];
-        self.each(windows, values, |band, value, area_m2| {
-            sums[band].weighted += area_m2 * value;
-            sums[band].area_m2 += area_m2;
+        self.each(windows, values, |band, value, area| {
+            sums[band].weighted += area.area_m2 * value;
+            sums[band].area_m2 += area.area_m2;
+            sums[band].covered_m2 += area.covered_m2;
         });
         sums
     }
@@ -164,28 +208,51 @@ impl Bands {
             .iter()
             .map(|sum| sum.mean().unwrap_or_default())
             .collect();
-        self.each(windows, values, |band, value, area_m2| {
+        self.each(windows, values, |band, value, area| {
             let apart = value - means[band];
-            sums[band].squares += area_m2 * apart * apart;
+            sums[band].squares += area.area_m2 * apart * apart;
         });
         sums
     }
 
-    /// Area of those cells of each band that are some of the grid's, by row and column, m²: what sums of a field over them have,
-    /// to the bit.
-    pub fn areas_m2(&self, has: impl Fn(u32, u32) -> bool) -> Vec<f64> {
+    /// Areas of each band; some cells of the grid are told by row and column. Of these it is what sums of a field over them have, to the
+    /// bit.
+    pub fn areas(&self, is_some: impl Fn(u32, u32) -> bool) -> Vec<BandAreas> {
         let windows = self.windows();
-        let mut areas_m2 = vec![0.0; self.edges_deg.len()];
+        let mut bands = vec![BandAreas::default(); self.edges_deg.len()];
+        let mut cells = vec![];
         for row in self.rows.clone() {
-            let area_m2 = self.area_m2[row as usize];
-            let cols = windows.iter().flat_map(|own| own.col..own.col + own.cols);
-            for col in cols.filter(|col| has(row, *col)) {
-                if let Some(band) = self.band_at(row, col) {
-                    areas_m2[band] += area_m2;
+            for window in &windows {
+                self.fill(row, window, &mut cells);
+                for (col, area) in (window.col..).zip(&cells) {
+                    let Some(band) = self.band_at(row, col) else {
+                        continue;
+                    };
+                    let own = &mut bands[band];
+                    own.all_m2 += area.area_m2;
+                    own.covered_m2 += area.covered_m2;
+                    if is_some(row, col) {
+                        own.some_m2 += area.area_m2;
+                    }
                 }
             }
         }
-        areas_m2
+        bands
+    }
+
+    /// What counts of the cells of a row of a window.
+    fn fill(&self, row: u32, window: &Window, cells: &mut Vec<CellArea>) {
+        cells.resize(window.cols as usize, CellArea::default());
+        match &self.areas {
+            Areas::Whole(areas_m2) => {
+                let area_m2 = areas_m2[row as usize];
+                cells.fill(CellArea {
+                    area_m2,
+                    covered_m2: area_m2,
+                });
+            }
+            Areas::Shares(shares) => shares.row(row, window, cells),
+        }
     }
 
     fn band_at(&self, row: u32, col: u32) -> Option<usize> {
@@ -196,24 +263,40 @@ impl Bands {
         self.band_of[at as usize]
     }
 
-    /// Hands over the band, the value and the area of each cell that has a value in a band, row by row.
-    fn each(&self, windows: &[Window], values: &[Vec<f32>], mut take: impl FnMut(usize, f64, f64)) {
+    /// Hands over the band, the value and the area of each cell that has a value and an area in a band, row by row.
+    fn each(
+        &self,
+        windows: &[Window],
+        values: &[Vec<f32>],
+        mut take: impl FnMut(usize, f64, CellArea),
+    ) {
+        let mut areas = vec![];
         for row in self.rows.clone() {
-            let area_m2 = self.area_m2[row as usize];
             for (window, values) in windows.iter().zip(values) {
                 let start = (row - window.row) as usize * window.cols as usize;
                 let cells = &values[start..start + window.cols as usize];
-                for (col, value) in (window.col..).zip(cells) {
-                    if value.is_nan() {
+                self.fill(row, window, &mut areas);
+                for ((col, value), area) in (window.col..).zip(cells).zip(&areas) {
+                    if value.is_nan() || area.area_m2 <= 0.0 {
                         continue;
                     }
                     if let Some(band) = self.band_at(row, col) {
-                        take(band, f64::from(*value), area_m2);
+                        take(band, f64::from(*value), *area);
                     }
                 }
             }
         }
     }
+}
+
+fn middle_lat(grid: &Grid, row: u32) -> f64 {
+    0.5 * (grid.row_north_deg(row) + grid.row_north_deg(row + 1))
+}
+
+/// East of a west, so that bands do not break at the date line.
+fn middle_lon(grid: &Grid, west: f64, col: u32) -> f64 {
+    let middle = grid.col_west_deg(col) + 0.5 * grid.dlon_deg;
+    west + (middle - west).rem_euclid(360.0)
 }
 
 #[cfg(test)]
@@ -317,7 +400,8 @@ mod tests {
                 .iter()
                 .map(|sum| sum.area_m2)
                 .collect();
-            let found = bands.areas_m2(|row, col| (row * 6 + col) % 5 != 3);
+            let found = bands.areas(|row, col| (row * 6 + col) % 5 != 3);
+            let found: Vec<f64> = found.iter().map(|own| own.some_m2).collect();
             assert!(expected.len() > 2 && expected.iter().all(|area| *area > 0.0));
             let bits = |areas: &[f64]| areas.iter().map(|area| area.to_bits()).collect::<Vec<_>>();
             assert_eq!(bits(&found), bits(&expected), "{along:?}");

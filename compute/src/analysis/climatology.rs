@@ -13,7 +13,8 @@ use super::undefined::Undefined;
 /// The climatology of a series over the years of `base`, those of the series if absent.
 ///
 /// `periods` are in the order of time, `values` beside them, NaN no data, any unit. A step belongs to the bin and the year of
-/// its middle. Spread is the standard deviation with the divisor n - 1.
+/// its middle. Spread is the standard deviation with the divisor n - 1, as of
+/// a sample: that of the statistic `std` has the divisor n (docs/answers.md).
 ///
 /// # Errors
 /// Steps longer than a bin, no data, no data in the base period.
@@ -201,7 +202,7 @@ pub fn mean(values: &[f64]) -> Option<f64> {
     (!values.is_empty()).then(|| sum / values.len() as f64)
 }
 
-/// Standard deviation with the divisor n - 1; none of fewer than two. In two passes, so that large means cost no digits.
+/// Standard deviation √(Σ (x - m)² / (n - 1)); none of fewer than two. In two passes, so that large means cost no digits.
 pub fn spread(values: &[f64]) -> Option<f64> {
     let mean = mean(values).filter(|_| values.len() > 1)?;
     let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();

@@ -3,23 +3,26 @@
 use std::sync::Arc;
 
 use contract::ContractError;
-use contract::analysis::{Along, Hovmoller, HovmollerBand, HovmollerQuery, HovmollerRow};
+use contract::analysis::{Along, Hovmoller, HovmollerQuery, HovmollerRow};
 use contract::cited::Cited;
-use contract::grid::Grid;
+use contract::grid::rounded_deg;
 use contract::manifest::{Manifest, Step};
 use contract::quantity::Display;
+use contract::region::Region;
+use contract::statistics::MinCoverage;
 use contract::time::{Period, TimeStep};
 use cube::Values;
 use futures::TryStreamExt as _;
 use futures::future::BoxFuture;
 use storage::{Store, domain};
 
-use super::bands::{BandSum, Bands};
+use super::banded::Banded;
+use super::bands::{BandAreas, BandSum, Bands};
 use super::read::Version;
 use super::timeline::{bins_over, no_shorter};
-use crate::ComputeError;
 use crate::step_range::step_range;
 use crate::summed::check_averaged;
+use crate::{ComputeError, Engine};
 
 /// Means in one answer: 5 MiB as text.
 const MOST_MEANS: usize = 400_000;
@@ -29,12 +32,14 @@ const BANDS_DEG: [f64; 4] = [1.0, 2.0, 5.0, 10.0];
 /// The means of bands of a version of a product against time.
 ///
 /// Of each step the cells inside the bounds are read, with what is stored round them. Each counts by area and time: the mean of a month is that of all its
-/// cells with data over all its time, so that a cell that is seen once counts by the step that saw it.
+/// cells with data over all its time, so that a cell that is seen once counts by the step that saw it. Of polygons each cell counts by its
+/// exact share, as in the mean over the polygons clipped to a band; a cell that an edge of a band cuts is in the band of its middle.
 ///
 /// # Errors
-/// No step in the period, nothing of the grid inside the bounds, bands below the size of cells, more means than one answer holds.
+/// No step in the period, nothing of the grid inside the bounds or the region, bands below the size of cells, more means than one answer
+/// holds.
 pub fn hovmoller<'a>(
-    store: &'a Store,
+    engine: &'a Engine,
     (manifest, id): Version<'a>,
     query: &'a HovmollerQuery,
 ) -> BoxFuture<'a, Result<Hovmoller, ComputeError>> {
@@ -42,18 +47,28 @@ pub fn hovmoller<'a>(
         check_averaged(manifest)?;
         let (_window, steps) = manifest.steps_inside(query.from, query.to)?;
         let grid = &manifest.grid;
-        let band_deg = band_deg(grid, query)?;
-        let bounds_deg = bounds_deg(grid, query)?;
-        let bands = Bands::of(grid, query.along, band_deg, bounds_deg, query.earth);
-        if bands.edges_deg().is_empty() {
-            let reason = format!(
-                "no cell of {} has its middle in it; it covers {}",
-                manifest.product,
-                manifest.bounds_text()
-            );
-            let text = bounds_deg.map(|edge| edge.to_string()).join(",");
-            return Err(ContractError::invalid("region", &text, reason).into());
-        }
+        let band_deg = band_deg(manifest, query)?;
+        let banded = match query.region.as_ref().map(|asked| &asked.region) {
+            None | Some(Region::Global) => {
+                Banded::of_box(manifest, query, band_deg, grid.shown_bounds_deg())?
+            }
+            Some(Region::Box {
+                west,
+                south,
+                east,
+                north,
+            }) => Banded::of_box(manifest, query, band_deg, [*west, *south, *east, *north])?,
+            Some(region @ Region::Polygons(_)) => {
+                Box::pin(Banded::of_region(
+                    engine,
+                    manifest,
+                    query,
+                    (band_deg, region),
+                ))
+                .await?
+            }
+        };
+        let bands = &banded.bands;
         let periods: Vec<Period> = steps.iter().map(|step| step.period).collect();
         let step = no_shorter(&periods, query.step);
         let bins = bins_over(&periods, step);
@@ -64,104 +79,134 @@ pub fn hovmoller<'a>(
             );
             return Err(ContractError::invalid("step", step.as_str(), reason).into());
         }
-        let bands = Arc::new(bands);
-        let areas_m2 = domain_areas(store, manifest, &bands).await?;
+        let store = engine.store();
+        let areas = areas(store, manifest, bands).await?;
         // One row of all is a profile, which is told with its spread.
         let with_stds = step == TimeStep::Total;
-        let sums = sums_in(store, manifest, &steps, &bands, (&bins[..], with_stds)).await?;
-        let display = manifest.quantity.display();
-        let row = |(bin, sums): (&Period, &Vec<BandSum>)| {
-            row(*bin, sums, &areas_m2, (display, with_stds))
+        let sums = sums_in(store, manifest, &steps, bands, (&bins[..], with_stds)).await?;
+        let mut rows = Rows {
+            covered_m2: areas.iter().map(|own| banded.covered_m2(own)).collect(),
+            display: manifest.quantity.display(),
+            with_stds,
+            least: query.min_coverage,
+            left_out: 0,
         };
-        let band = |((low_deg, high_deg), area_m2): (&(f64, f64), &f64)| HovmollerBand {
-            low_deg: *low_deg,
-            high_deg: *high_deg,
-            area_m2: *area_m2,
-        };
+        let all = bins.iter().zip(&sums);
+        let all: Vec<HovmollerRow> = all.map(|(bin, sums)| rows.row(*bin, sums)).collect();
+        let edges = bands.edges_deg().iter().zip(&areas);
         Ok(Hovmoller {
             cited: Cited::of(manifest, id.clone()),
             along: query.along,
             band_deg,
-            bounds_deg,
+            bounds_deg: banded.bounds_deg,
             step,
             earth: query.earth,
-            bands: bands.edges_deg().iter().zip(&areas_m2).map(band).collect(),
-            rows: bins.iter().zip(&sums).map(row).collect(),
+            coverage_basis: banded.coverage_basis().to_owned(),
+            min_coverage_percent: query.min_coverage.percent(),
+            left_out_count: rows.left_out,
+            bands: edges.map(|(edges, own)| banded.band(*edges, own)).collect(),
+            notes: banded.notes(&areas, rows.left_out_note(means)),
+            region: banded.region,
+            rows: all,
         })
     })
 }
 
-/// A row of the sums of bands whose areas with data are `areas_m2`.
-fn row(
-    bin: Period,
-    sums: &[BandSum],
-    areas_m2: &[f64],
-    (display, with_stds): (Display, bool),
-) -> HovmollerRow {
-    let coverage_percent = |(sum, area_m2): (&BandSum, &f64)| {
-        let all = area_m2 * bin.seconds();
-        if all > 0.0 {
-            (100.0 * sum.area_m2 / all).min(100.0)
-        } else {
-            0.0
+/// What rows are made with.
+struct Rows {
+    /// Of each band, what coverage is a share of, m².
+    covered_m2: Vec<f64>,
+    display: Display,
+    with_stds: bool,
+    least: MinCoverage,
+    /// Means that were left out of rows so far.
+    left_out: u64,
+}
+
+impl Rows {
+    fn row(&mut self, bin: Period, sums: &[BandSum]) -> HovmollerRow {
+        let (display, least) = (self.display, self.least.percent());
+        let coverage_percent = |(sum, area_m2): (&BandSum, &f64)| {
+            let all = area_m2 * bin.seconds();
+            if all > 0.0 {
+                (100.0 * sum.covered_m2 / all).min(100.0)
+            } else {
+                0.0
+            }
+        };
+        let covered = sums.iter().zip(&self.covered_m2);
+        let coverage_percent: Vec<f64> = covered.map(coverage_percent).collect();
+        let is_kept = |(sum, percent): (&BandSum, &f64)| sum.area_m2 > 0.0 && *percent >= least;
+        let kept: Vec<bool> = sums.iter().zip(&coverage_percent).map(is_kept).collect();
+        let with_data = sums.iter().filter(|sum| sum.area_m2 > 0.0).count();
+        let kept_count = kept.iter().filter(|is_kept| **is_kept).count();
+        self.left_out += (with_data - kept_count) as u64;
+        let own = || {
+            sums.iter()
+                .zip(&kept)
+                .map(|(sum, kept)| kept.then_some(sum))
+        };
+        let mean = |sum: Option<&BandSum>| sum?.mean().map(|mean| display.shown(mean));
+        let std = |sum: Option<&BandSum>| sum?.std().map(|std| std * display.factor.abs());
+        HovmollerRow {
+            start: bin.start,
+            end: bin.end,
+            means: own().map(mean).collect(),
+            stds: own().filter(|_| self.with_stds).map(std).collect(),
+            coverage_percent,
         }
-    };
-    let mean = |sum: &BandSum| sum.mean().map(|mean| display.shown(mean));
-    let std = |sum: &BandSum| sum.std().map(|std| std * display.factor.abs());
-    HovmollerRow {
-        start: bin.start,
-        end: bin.end,
-        means: sums.iter().map(mean).collect(),
-        stds: sums.iter().filter(|_| with_stds).map(std).collect(),
-        coverage_percent: sums.iter().zip(areas_m2).map(coverage_percent).collect(),
+    }
+
+    /// What was left out of so many means.
+    fn left_out_note(&self, means: usize) -> Option<String> {
+        let (out, least) = (self.left_out, self.least.percent());
+        (out > 0).then(|| {
+            format!(
+                "{out} of {means} means have a coverage of less than {least} % and are left out"
+            )
+        })
     }
 }
 
-fn band_deg(grid: &Grid, query: &HovmollerQuery) -> Result<f64, ContractError> {
+fn band_deg(manifest: &Manifest, query: &HovmollerQuery) -> Result<f64, ContractError> {
     let cell_deg = match query.along {
-        Along::Lat => grid.dlat_deg,
-        Along::Lon => grid.dlon_deg,
+        Along::Lat => manifest.grid.dlat_deg,
+        Along::Lon => manifest.grid.dlon_deg,
     };
     // Steps of grids come from rounded coordinates.
     let least = cell_deg * (1.0 - 1e-6);
+    let shown_deg = rounded_deg(cell_deg);
+    let refused = |band: f64, reason: String| {
+        let text = band.to_string();
+        Err(ContractError::invalid("band", &text, reason))
+    };
     match query.band_deg {
         None => Ok(BANDS_DEG
             .into_iter()
             .find(|band| *band >= least)
             .unwrap_or(cell_deg)),
         Some(band) if band.is_finite() && band >= least && band <= 180.0 => Ok(band),
-        Some(band) => {
-            let reason = format!("from the size of a cell, {cell_deg}, to 180 degrees");
-            Err(ContractError::invalid("band", &band.to_string(), reason))
-        }
+        Some(band) if band > 0.0 && band < least => refused(
+            band,
+            format!(
+                "the band is narrower than the cells of {}, of {shown_deg} degrees: ask for bands of {shown_deg} degrees or more, or leave \
+                 their size out",
+                manifest.product
+            ),
+        ),
+        Some(band) => refused(
+            band,
+            format!("from the size of a cell, {shown_deg}, to 180 degrees"),
+        ),
     }
 }
 
-fn bounds_deg(grid: &Grid, query: &HovmollerQuery) -> Result<[f64; 4], ContractError> {
-    let Some(bounds) = query.bounds_deg else {
-        return Ok(grid.shown_bounds_deg());
-    };
-    let [west, south, east, north] = bounds;
-    let is_one = bounds.iter().all(|edge| edge.is_finite())
-        && (-90.0..=90.0).contains(&south)
-        && (-90.0..=90.0).contains(&north)
-        && south < north
-        && west < east
-        && east - west <= 360.0;
-    if is_one {
-        return Ok(bounds);
-    }
-    let text = bounds.map(|edge| edge.to_string()).join(",");
-    let valid = "west,south,east,north in degrees, at most once around";
-    Err(ContractError::invalid("region", &text, valid))
-}
-
-/// Area of the cells of each band that hold data in some step, m².
-async fn domain_areas(
+/// Areas of each band; some cells are those that hold data in some step.
+async fn areas(
     store: &Store,
     manifest: &Manifest,
     bands: &Bands,
-) -> Result<Vec<f64>, ComputeError> {
+) -> Result<Vec<BandAreas>, ComputeError> {
     let cells = domain::read_cells(store, &manifest.domain).await?;
     if cells.map_count() != manifest.grid.cell_count() {
         let what = manifest.domain.to_string();
@@ -171,7 +216,7 @@ async fn domain_areas(
         ));
     }
     let cols = manifest.grid.cols as usize;
-    Ok(bands.areas_m2(|row, col| cells.has(row as usize * cols + col as usize)))
+    Ok(bands.areas(|row, col| cells.has(row as usize * cols + col as usize)))
 }
 
 /// Sums of each bin and band, by area and seconds, with squares where they are asked for.

@@ -4,8 +4,10 @@ use std::collections::BTreeSet;
 
 use contract::ContractError;
 use contract::analysis::{
-    CalendarBins, Correlation, CorrelationQuery, Difference, DifferenceSide, SeriesQuery,
+    CalendarBins, Correlation, CorrelationQuery, CorrelationRow, Difference, DifferenceSide,
+    SeriesQuery,
 };
+use contract::product::ProductId;
 use contract::statistics::MinCoverage;
 use contract::time::TimeStep;
 use futures::future::BoxFuture;
@@ -35,9 +37,9 @@ pub fn correlation<'a>(
 ) -> BoxFuture<'a, Result<Correlation, ComputeError>> {
     Box::pin(async move {
         let other = query.series.of_product(query.with.clone());
-        let all = MinCoverage::default();
-        let a = read::series(engine, first, &query.series, all).await?;
-        let b = read::series(engine, second, &other, all).await?;
+        let least = query.min_coverage;
+        let a = read::series(engine, first, &query.series, least).await?;
+        let b = read::series(engine, second, &other, least).await?;
         let mut common = CommonSteps::of([covered(&a), covered(&b)], query.step)?;
         common.check_lag(query.max_lag)?;
         if query.deseasonalise {
@@ -53,13 +55,9 @@ pub fn correlation<'a>(
                 let nearer = b.0.abs().cmp(&a.0.abs()).then(a.0.cmp(&b.0));
                 a.1.total_cmp(&b.1).then(nearer)
             });
-        let mut notes = a.notes;
-        notes.extend(
-            b.notes
-                .into_iter()
-                .filter(|note| !notes.contains(note))
-                .collect::<Vec<_>>(),
-        );
+        let mut notes = notes_of([("first", &a.notes[..]), ("second", &b.notes[..])]);
+        let products = [&a.cited.product, &b.cited.product];
+        notes.extend(of_undefined(&rows, products, query.deseasonalise));
         Ok(Correlation {
             first: a.cited,
             second: b.cited,
@@ -68,11 +66,50 @@ pub fn correlation<'a>(
             deseasonalised: query.deseasonalise,
             start: common.extent().start,
             end: common.extent().end,
+            min_coverage_percent: least.percent(),
+            left_out_counts: [a.left_out as u64, b.left_out as u64],
             notes,
             rows,
             strongest_lag_steps: strongest.map(|(lag, _)| lag),
         })
     })
+}
+
+/// What is said of two sides: of both once, of one alone with its name before it.
+fn notes_of([(a, of_a), (b, of_b)]: [(&str, &[String]); 2]) -> Vec<String> {
+    let own = |name: &str, note: &String, other: &[String]| {
+        if other.contains(note) {
+            note.clone()
+        } else {
+            format!("{name}: {note}")
+        }
+    };
+    let first = of_a.iter().map(|note| own(a, note, of_b));
+    let second = of_b.iter().filter(|note| !of_a.contains(note));
+    first.chain(second.map(|note| own(b, note, of_a))).collect()
+}
+
+/// What is to be said of lags without a correlation: how many they are, and why lag 0 or else the first of them has none.
+fn of_undefined(
+    rows: &[CorrelationRow],
+    [first, second]: [&ProductId; 2],
+    are_deseasonalised: bool,
+) -> Option<String> {
+    let without = || rows.iter().filter(|row| row.undefined.is_some());
+    let told = without().find(|row| row.lag_steps == 0);
+    let told = told.or_else(|| without().next())?;
+    let why = told.undefined.as_deref()?;
+    let less = if are_deseasonalised {
+        ", less the mean of each calendar month"
+    } else {
+        ""
+    };
+    Some(format!(
+        "{} of {} lags have no correlation, lag {} for this: {why} (the first is {first}, the second {second}{less})",
+        without().count(),
+        rows.len(),
+        told.lag_steps
+    ))
 }
 
 /// What a series covers.
@@ -83,7 +120,8 @@ fn covered(series: &ReadSeries) -> Covered<'_> {
     }
 }
 
-/// The mean over time of one version of a product less that of another version, product or period.
+/// The mean over time of one version of a product less that of another version, product or period; steps that hold data over less of a
+/// region's sea, or of a line, than `least` are left out of either.
 ///
 /// # Errors
 /// Those of reading either; two units; twice the same.
@@ -91,6 +129,7 @@ pub fn difference<'a>(
     engine: &'a Engine,
     of: (Version<'a>, &'a SeriesQuery),
     minus: (Version<'a>, &'a SeriesQuery),
+    least: MinCoverage,
 ) -> BoxFuture<'a, Result<Difference, ComputeError>> {
     Box::pin(async move {
         let (a_id, b_id) = (of.0.1, minus.0.1);
@@ -99,9 +138,8 @@ pub fn difference<'a>(
                 "both sides are the same: give another product, version or period to take off";
             return Err(ContractError::invalid("difference", &a_id.to_string(), reason).into());
         }
-        let all = MinCoverage::default();
-        let a = read::series(engine, of.0, of.1, all).await?;
-        let b = read::series(engine, minus.0, minus.1, all).await?;
+        let a = read::series(engine, of.0, of.1, least).await?;
+        let b = read::series(engine, minus.0, minus.1, least).await?;
         if a.cited.unit != b.cited.unit || a.cited.quantity != b.cited.quantity {
             let reason = format!(
                 "{} holds {}, {} holds {}: they have no difference",
@@ -117,13 +155,7 @@ pub fn difference<'a>(
         let (mean_a, mean_b) = (of_side(&a), of_side(&b));
         let difference = mean_a.mean.zip(mean_b.mean).map(|(a, b)| a - b);
         let error = welch(&mean_a, &mean_b);
-        let mut notes = a.notes.clone();
-        notes.extend(
-            b.notes
-                .iter()
-                .filter(|note| !a.notes.contains(note))
-                .cloned(),
-        );
+        let mut notes = notes_of([("of", &a.notes[..]), ("minus", &b.notes[..])]);
         notes.extend(of_seasons([(&a, &mean_a), (&b, &mean_b)]));
         Ok(Difference {
             place: a.place.clone(),
@@ -133,6 +165,7 @@ pub fn difference<'a>(
             p_value: error.and_then(|(_, p_value)| p_value),
             of: side(a, &mean_a),
             minus: side(b, &mean_b),
+            min_coverage_percent: least.percent(),
             notes,
         })
     })
@@ -205,6 +238,7 @@ fn side(series: ReadSeries, mean: &MeanOverTime) -> DifferenceSide {
         start: extent.start,
         end: extent.end,
         count: mean.count as u64,
+        left_out_count: series.left_out as u64,
         mean: mean.mean,
         effective_count: mean.effective_count,
     }

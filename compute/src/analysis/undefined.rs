@@ -34,6 +34,14 @@ pub enum Undefined {
         /// Number of values.
         count: usize,
     },
+    /// One of two series is the same at every step that both have.
+    #[error("all {count} values of {side} are equal: a correlation is not defined")]
+    ConstantSide {
+        /// Which of the two.
+        side: &'static str,
+        /// Pairs of values.
+        count: usize,
+    },
     /// A step covers more than a part of the year.
     #[error("steps of {step_days:.0} days have no {bin}: {what} needs shorter ones")]
     StepTooLong {

@@ -1,6 +1,6 @@
 //! Weights of cells as whole numbers: how much of each the geometry has, and how much of that coverage counts.
 
-use contract::chunk::{CHUNK_COLS, CHUNK_ROWS, Window, field_chunks};
+use contract::chunk::{Window, field_chunks};
 use contract::earth::Earth;
 use contract::grid::Grid;
 use cube::BLOCK_CELLS;
@@ -143,24 +143,10 @@ impl Cells<'_> {
         cells: &mut [C],
         set: impl Fn(&mut C, f64),
     ) {
-        let chunks_across = self.shape[1].div_ceil(CHUNK_COLS);
-        let mut col = first_col;
         let end = first_col + cells.len() as u32;
-        while col < end {
-            let across = col / CHUNK_COLS;
-            let chunk_end = ((across + 1) * CHUNK_COLS).min(self.shape[1]);
-            let chunk = row / CHUNK_ROWS * chunks_across + across;
-            let run_end = end.min(chunk_end);
-            if let Some(areas) = weights.areas_m2(chunk) {
-                let width = chunk_end - across * CHUNK_COLS;
-                let at = (row % CHUNK_ROWS) * width + col % CHUNK_COLS;
-                let own = &mut cells[(col - first_col) as usize..(run_end - first_col) as usize];
-                for (cell, area) in own.iter_mut().zip(&areas[at as usize..]) {
-                    set(cell, *area);
-                }
-            }
-            col = run_end;
-        }
+        weights.each_in_row(self.shape[1], row, first_col..end, |col, weight| {
+            set(&mut cells[(col - first_col) as usize], weight);
+        });
     }
 
     /// Numbers of the blocks that hold weight, increasing; a bit a block is held to find them.

@@ -2,8 +2,10 @@
 
 use std::collections::BTreeMap;
 use std::future::Future;
+use std::ops::Range;
 use std::sync::Arc;
 
+use contract::chunk::{CHUNK_COLS, CHUNK_ROWS};
 use datafusion::error::DataFusionError;
 use quick_cache::Weighter;
 use quick_cache::sync::Cache;
@@ -52,6 +54,32 @@ impl RegionWeights {
         self.chunks
             .iter()
             .map(|(chunk, areas)| (*chunk, &areas[..]))
+    }
+
+    /// Hands over the column and the weight of the cells of a run of a row that lie in chunks which the geometry touches, eastwards;
+    /// the grid has `grid_cols` columns.
+    pub(crate) fn each_in_row(
+        &self,
+        grid_cols: u32,
+        row: u32,
+        cols: Range<u32>,
+        mut take: impl FnMut(u32, f64),
+    ) {
+        let chunks_across = grid_cols.div_ceil(CHUNK_COLS);
+        let mut col = cols.start;
+        while col < cols.end {
+            let across = col / CHUNK_COLS;
+            let chunk_end = ((across + 1) * CHUNK_COLS).min(grid_cols);
+            let run_end = cols.end.min(chunk_end);
+            if let Some(areas) = self.areas_m2(row / CHUNK_ROWS * chunks_across + across) {
+                let width = chunk_end - across * CHUNK_COLS;
+                let at = (row % CHUNK_ROWS) * width + col % CHUNK_COLS;
+                for (col, area) in (col..run_end).zip(&areas[at as usize..]) {
+                    take(col, *area);
+                }
+            }
+            col = run_end;
+        }
     }
 
     fn size_bytes(&self) -> u64 {

@@ -2,10 +2,10 @@
 
 use compute::analysis::{self, analyse};
 use compute::reduce::statistics_of;
-use compute::{Engine, ErrorClass};
+use compute::{ComputeError, Engine, ErrorClass};
 use contract::analysis::{
-    Along, AnalysisOptions, AnalysisPart, CorrelationQuery, HovmollerQuery, LineSeriesQuery,
-    SeriesQuery,
+    Along, AnalysisOptions, AnalysisPart, CorrelationQuery, Difference, HovmollerQuery,
+    LineSeriesQuery, SeriesQuery,
 };
 use contract::earth::Earth;
 use contract::grid::{Grid, LonLatDeg};
@@ -340,6 +340,17 @@ async fn a_month_that_is_missing_keeps_its_place_in_a_correlation_of_native_step
     assert_eq!(found.await.unwrap().rows[0].count, 65);
 }
 
+/// The difference of two versions of products, whatever is covered.
+async fn differ(
+    engine: &Engine,
+    (of, of_series): (&Manifest, &SeriesQuery),
+    (minus, minus_series): (&Manifest, &SeriesQuery),
+) -> Result<Difference, ComputeError> {
+    let (a, b) = (of.id(), minus.id());
+    let (of, minus) = (((of, &a), of_series), ((minus, &b), minus_series));
+    analysis::difference(engine, of, minus, MinCoverage::default()).await
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn periods_versions_and_products_are_compared() {
     let (_folder, store) = folder_store();
@@ -361,9 +372,8 @@ async fn periods_versions_and_products_are_compared() {
     let engine = Engine::in_process(store.clone(), parts(2));
     let all = region("wind", "-140,-19,-120,-10");
     let [early, late] = ["2001/2005", "2006/2010"].map(|years| all.in_years(years.parse().ok()));
-    let (a, b, c) = (first.id(), second.id(), ice.id());
-    let later = analysis::difference(&engine, ((&first, &a), &late), ((&first, &a), &early));
-    let later = later.await.unwrap();
+    let later = differ(&engine, (&first, &late), (&first, &early)).await;
+    let later = later.unwrap();
     assert!((later.difference.unwrap() - 0.15).abs() < 1e-3, "{later:?}");
     assert!(later.p_value.unwrap() < 1e-3 && later.of.count == 60);
     assert!(later.notes.is_empty(), "{later:?}");
@@ -392,8 +402,8 @@ async fn periods_versions_and_products_are_compared() {
             SeriesQuery::Region(query)
         };
         let (of, minus) = (inside(of), inside(minus));
-        let found = analysis::difference(&engine, ((&first, &a), &of), ((&first, &a), &minus));
-        let found = found.await.unwrap();
+        let found = differ(&engine, (&first, &of), (&first, &minus)).await;
+        let found = found.unwrap();
         assert_eq!(found.notes.len(), notes.len(), "{:?}", found.notes);
         let is_said = |(note, part): (&String, &&str)| note.contains(*part);
         assert!(
@@ -402,15 +412,15 @@ async fn periods_versions_and_products_are_compared() {
             found.notes
         );
     }
-    let versions = analysis::difference(&engine, ((&second, &b), &all), ((&first, &a), &all));
-    assert!((versions.await.unwrap().difference.unwrap() - 1.0).abs() < 1e-6);
+    let versions = differ(&engine, (&second, &all), (&first, &all)).await;
+    assert!((versions.unwrap().difference.unwrap() - 1.0).abs() < 1e-6);
     for (minus, reason) in [
-        ((&first, &a), "both sides are the same"),
-        ((&ice, &c), "have no difference"),
+        (&first, "both sides are the same"),
+        (&ice, "have no difference"),
     ] {
-        let other = all.of_product(minus.0.product.clone());
-        let refused = analysis::difference(&engine, ((&first, &a), &all), (minus, &other));
-        let refused = refused.await.unwrap_err();
+        let other = all.of_product(minus.product.clone());
+        let refused = differ(&engine, (&first, &all), (minus, &other)).await;
+        let refused = refused.unwrap_err();
         assert_eq!(refused.class(), ErrorClass::BadRequest);
         assert!(refused.to_string().contains(reason), "{refused}");
     }
@@ -434,13 +444,15 @@ async fn the_profile_of_bands_has_their_mean_spread_and_coverage_over_the_whole_
         product: product("wind"),
         along: Along::Lat,
         band_deg: None,
-        bounds_deg: None,
+        region: None,
         step: TimeStep::Total,
         from: None,
         to: None,
         earth: Earth::Wgs84,
+        min_coverage: MinCoverage::default(),
     };
-    let found = analysis::hovmoller(&store, (&manifest, &id), &whole).await;
+    let engine = Engine::local(store);
+    let found = analysis::hovmoller(&engine, (&manifest, &id), &whole).await;
     let found = found.unwrap();
     assert_eq!((found.rows.len(), found.step), (1, TimeStep::Total));
     let row = &found.rows[0];
@@ -461,7 +473,7 @@ async fn the_profile_of_bands_has_their_mean_spread_and_coverage_over_the_whole_
         step: TimeStep::Month,
         ..whole
     };
-    let found = analysis::hovmoller(&store, (&manifest, &id), &monthly).await;
+    let found = analysis::hovmoller(&engine, (&manifest, &id), &monthly).await;
     assert!(found.unwrap().rows.iter().all(|row| row.stds.is_empty()));
 }
 
@@ -484,14 +496,16 @@ async fn bands_are_means_by_area_and_time_and_say_what_they_cover() {
         product: product("wind"),
         along: Along::Lat,
         band_deg: None,
-        bounds_deg: None,
+        region: None,
         step: TimeStep::Month,
         from: None,
         to: None,
         earth: Earth::Wgs84,
+        min_coverage: MinCoverage::default(),
     };
+    let engine = Engine::local(store);
     let of =
-        async |query: &HovmollerQuery| analysis::hovmoller(&store, (&manifest, &id), query).await;
+        async |query: &HovmollerQuery| analysis::hovmoller(&engine, (&manifest, &id), query).await;
     let found = of(&query).await.unwrap();
     assert_eq!(
         (found.rows.len(), found.bands.len(), found.band_deg),
@@ -514,7 +528,7 @@ async fn bands_are_means_by_area_and_time_and_say_what_they_cover() {
         step: TimeStep::Year,
         band_deg: Some(9.0),
         along: Along::Lon,
-        bounds_deg: Some([-140.0, -19.0, -120.0, -18.0]),
+        region: "-140,-19,-120,-18".parse().ok(),
         ..query.clone()
     };
     let found = of(&years).await.unwrap();
@@ -538,7 +552,7 @@ async fn bands_are_means_by_area_and_time_and_say_what_they_cover() {
                 band_deg: Some(0.1),
                 ..query.clone()
             },
-            "from the size of a cell",
+            "narrower than the cells of wind, of 1 degrees: ask for bands of 1 degrees or more",
         ),
         (
             HovmollerQuery {
@@ -549,17 +563,24 @@ async fn bands_are_means_by_area_and_time_and_say_what_they_cover() {
         ),
         (
             HovmollerQuery {
-                bounds_deg: Some([0.0, 10.0, 5.0, 20.0]),
+                region: "0,10,5,20".parse().ok(),
                 ..query.clone()
             },
-            "no cell",
+            "it covers",
         ),
         (
             HovmollerQuery {
-                bounds_deg: Some([0.0, 20.0, 5.0, 10.0]),
+                region: "-131,-15.4,-129,-15.1".parse().ok(),
                 ..query.clone()
             },
-            "west,south",
+            "narrower than these cells, of 1 by 1 degrees; ask for a box",
+        ),
+        (
+            HovmollerQuery {
+                region: "POLYGON((0 10,5 10,5 20,0 10))".parse().ok(),
+                ..query.clone()
+            },
+            "does not touch the grid",
         ),
         (
             HovmollerQuery {

@@ -7,6 +7,8 @@ mod analysed;
 #[cfg(test)]
 mod anomalies;
 #[cfg(test)]
+mod banded;
+#[cfg(test)]
 mod budgets;
 #[cfg(test)]
 mod cleaned;

@@ -12,6 +12,7 @@ use contract::grid::Grid;
 use contract::manifest::Manifest;
 use contract::observation::{Observation, PlatformKind, Quality};
 use contract::quantity::Quantity;
+use contract::statistics::MinCoverage;
 use contract::time::{Period, TimeStep};
 use serde_json::Value;
 use storage::Store;
@@ -31,7 +32,7 @@ const GRID: Grid = Grid {
 /// As many as compaction makes a run of.
 const STEPS: u32 = 16;
 /// Inside of the western chunk.
-const BOX: [f64; 4] = [-149.0, -3.0, -147.5, -1.0];
+const BOX: &str = "-149,-3,-147.5,-1";
 
 /// Months of values that do not compress, with gaps.
 fn steps() -> Vec<(Period, Vec<f32>)> {
@@ -84,14 +85,16 @@ async fn answers(store: &Store, manifest: &Manifest) -> (Vec<Value>, [u64; 2]) {
         product: manifest.product.clone(),
         along: Along::Lat,
         band_deg: None,
-        bounds_deg: Some(BOX),
+        region: BOX.parse().ok(),
         step: TimeStep::Month,
         from: None,
         to: None,
         earth: Earth::Wgs84,
+        min_coverage: MinCoverage::default(),
     };
     let id = manifest.id();
-    let bands = hovmoller(&store, (manifest, &id), &query).await.unwrap();
+    let reader = Engine::local(store.clone());
+    let bands = hovmoller(&reader, (manifest, &id), &query).await.unwrap();
     let of_bands = traffic.counts().read_bytes - of_matchup;
     let words = ErrorWords {
         error: Some("20%"),
@@ -101,7 +104,7 @@ async fn answers(store: &Store, manifest: &Manifest) -> (Vec<Value>, [u64; 2]) {
     };
     let uncertain = BudgetQuery {
         errors: words.asked().unwrap(),
-        ..total(&manifest.product, "-149,-3,-147.5,-1")
+        ..total(&manifest.product, BOX)
     };
     let engine = Engine::in_process(store, parts(2));
     let uncertain = budget(&engine, &uncertain).await.unwrap();

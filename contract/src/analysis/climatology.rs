@@ -25,7 +25,7 @@ pub struct ClimatologyRow {
     /// Mean of its steps, in the answer's unit; none without data.
     #[schema(required)]
     pub mean: Option<f64>,
-    /// Standard deviation of its steps, divided by one less than their number; none of fewer than two.
+    /// Standard deviation of its steps, each once, as of a sample: √(Σ (x - m)² / (n - 1)); none of fewer than two.
     #[schema(required)]
     pub spread: Option<f64>,
     /// Steps with data.

@@ -7,6 +7,7 @@ use super::{AnalysisOptions, SeriesPlace, SeriesQuery};
 use crate::ContractError;
 use crate::cited::Cited;
 use crate::product::ProductId;
+use crate::statistics::MinCoverage;
 use crate::time::{TimeMs, TimeStep};
 
 /// Most steps that one series is moved against the other.
@@ -37,6 +38,8 @@ pub struct CorrelationQuery {
     pub deseasonalise: bool,
     /// Most steps that one is moved against the other, at most 400.
     pub max_lag: u32,
+    /// Least share of a region's sea, or of a line, that a step of either must hold data over; those with less are left out.
+    pub min_coverage: MinCoverage,
 }
 
 impl CorrelationQuery {
@@ -52,6 +55,7 @@ impl CorrelationQuery {
             step: AnalysisOptions::USUAL_STEP,
             deseasonalise: false,
             max_lag,
+            min_coverage: MinCoverage::default(),
         })
     }
 }
@@ -74,7 +78,14 @@ pub struct Correlation {
     pub start: TimeMs,
     /// First instant after it.
     pub end: TimeMs,
-    /// What may surprise.
+    /// Least share of a region's sea, or of a line, that a step of either had to hold data over, percent.
+    #[serde(default)]
+    pub min_coverage_percent: f64,
+    /// Steps of the first and of the second that hold data over less than that, and were left out.
+    #[serde(default)]
+    pub left_out_counts: [u64; 2],
+    /// What may surprise: steps that cover little or were left out, lags without a correlation. What is said of one side alone begins with
+    /// `first` or `second`.
     pub notes: Vec<String>,
     /// One for each lag, from the second leading to the first leading.
     pub rows: Vec<CorrelationRow>,
@@ -93,6 +104,10 @@ pub struct CorrelationRow {
     /// Pearson's; none with fewer than three pairs, or where one side does not vary.
     #[schema(required)]
     pub correlation: Option<f64>,
+    /// Why there is none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub undefined: Option<String>,
     /// n (1 - r r') / (1 + r r') of n pairs, with each series' correlation with its next step where the product is above zero
     /// (Bretherton et al. 1999, doi:10.1175/1520-0442(1999)012<1990:TENOSD>2.0.CO;2).
     #[schema(required)]

@@ -28,7 +28,10 @@ pub struct Difference {
     /// Chance of one as far from none (Welch 1947, doi:10.1093/biomet/34.1-2.28).
     #[schema(required)]
     pub p_value: Option<f64>,
-    /// What may surprise.
+    /// Least share of a region's sea, or of a line, that a step of either side had to hold data over, percent.
+    #[serde(default)]
+    pub min_coverage_percent: f64,
+    /// What may surprise. What is said of one side alone begins with `of` or `minus`.
     pub notes: Vec<String>,
 }
 
@@ -42,8 +45,11 @@ pub struct DifferenceSide {
     pub start: TimeMs,
     /// First instant after it.
     pub end: TimeMs,
-    /// Steps with data.
+    /// Steps with data that were not left out.
     pub count: u64,
+    /// Steps that hold data over less than the least coverage, and were left out.
+    #[serde(default)]
+    pub left_out_count: u64,
     /// Mean over time, each step by its length; none without data.
     #[schema(required)]
     pub mean: Option<f64>,

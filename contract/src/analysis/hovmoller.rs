@@ -10,6 +10,8 @@ use crate::ContractError;
 use crate::cited::Cited;
 use crate::earth::Earth;
 use crate::product::ProductId;
+use crate::region::AskedRegion;
+use crate::statistics::MinCoverage;
 use crate::time::{TimeMs, TimeStep};
 
 /// What bands lie along.
@@ -59,8 +61,8 @@ pub struct HovmollerQuery {
     pub along: Along,
     /// Height or width of a band, degrees; if absent the least of 1, 2, 5, 10 that is no less than a cell.
     pub band_deg: Option<f64>,
-    /// West, south, east, north of the cells whose middles count; all if absent. East lies above west, up to 360 degrees.
-    pub bounds_deg: Option<[f64; 4]>,
+    /// Of a box the cells whose middles lie in it; of polygons their exact share of every cell. All cells if absent.
+    pub region: Option<AskedRegion>,
     /// What a row covers.
     pub step: TimeStep,
     /// First instant; the product's first if absent.
@@ -69,6 +71,8 @@ pub struct HovmollerQuery {
     pub to: Option<TimeMs>,
     /// Figure of the earth for areas.
     pub earth: Earth,
+    /// Means of bands whose coverage is below this are left out, percent.
+    pub min_coverage: MinCoverage,
 }
 
 /// Means of bands against time.
@@ -81,27 +85,49 @@ pub struct Hovmoller {
     pub along: Along,
     /// Height or width of a band, degrees.
     pub band_deg: f64,
-    /// West, south, east, north of the cells whose middles count.
+    /// West, south, east, north of the cells whose middles count; of polygons of the cells that they touch.
     pub bounds_deg: [f64; 4],
+    /// The region of polygons whose share of every cell counts; none of a box, of which cells count whole.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub region: Option<String>,
     /// What a row covers (one row of all: the profile of bands); of months and years each step counts by the time that lies in it.
     pub step: TimeStep,
     /// Figure of the earth for areas.
     pub earth: Earth,
+    /// What coverage is a share of.
+    pub coverage_basis: String,
+    /// Means of bands whose coverage is below this are left out, percent.
+    #[serde(default)]
+    pub min_coverage_percent: f64,
+    /// Means that were left out for that: there are data, and less than the least coverage.
+    #[serde(default)]
+    pub left_out_count: u64,
+    /// What may surprise: how the region was taken, bands that it does not touch, means that were left out.
+    pub notes: Vec<String>,
     /// Bands from the south or the west.
     pub bands: Vec<HovmollerBand>,
     /// One for each step in the order of time.
     pub rows: Vec<HovmollerRow>,
 }
 
-/// A band: cells whose middles lie in it, its lower edge included.
+/// A band: cells whose middles lie in it, its lower edge included; of polygons their shares of these cells.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct HovmollerBand {
     /// Its southern or western edge, degrees.
     pub low_deg: f64,
     /// Its northern or eastern edge, degrees.
     pub high_deg: f64,
-    /// Area of its cells that hold data in some step, m².
+    /// Area of its cells that hold data in some step, or of the region's shares of these, m².
     pub area_m2: f64,
+    /// Area of the region in it on the grid, m²: 0 of a band that polygons do not touch; none of a box.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub region_area_m2: Option<f64>,
+    /// Area of the region's sea in it on the grid, m²; none of a box.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub ocean_area_m2: Option<f64>,
 }
 
 /// A step.
@@ -111,12 +137,12 @@ pub struct HovmollerRow {
     pub start: TimeMs,
     /// First instant after it.
     pub end: TimeMs,
-    /// Mean of each band over its cells with data, by area; none without any.
+    /// Mean of each band over its cells with data, by area; none without any, or where too little is covered.
     pub means: Vec<Option<f64>>,
-    /// Standard deviation of each band's values about its mean, by area and time, in the unit of the values; of the whole period
-    /// (`total`) alone.
+    /// Standard deviation of each band's values about its mean, by area and time, in the unit of the values: √(Σ w (x - m)² / Σ w), of
+    /// the values as they are, as the statistic `std`. Of the whole period (`total`) alone.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub stds: Vec<Option<f64>>,
-    /// Share of each band's area that holds data, percent.
+    /// Share of each band, and of the row's time, that holds data, percent: of what `coverage_basis` says.
     pub coverage_percent: Vec<f64>,
 }

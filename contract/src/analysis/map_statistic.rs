@@ -29,7 +29,7 @@ pub enum MapStatistic {
     Count,
     /// Share of the time with data.
     Coverage,
-    /// Standard deviation of the steps about their mean, divided by one less than their number.
+    /// Standard deviation of the steps about their mean, each once, as of a sample: √(Σ (x - m)² / (n - 1)).
     Spread,
     /// Mean of each month or season over the base period.
     Climatology,

@@ -17,7 +17,7 @@ pub struct Season {
     pub semi_annual: Harmonic,
     /// Share of the variance about the mean (or the line) that both waves explain, percent.
     pub explained_percent: f64,
-    /// Standard deviation of what they leave.
+    /// Standard deviation of what they leave, of a sample: √(Σ x² / (n - 1)).
     pub residual_spread: f64,
     /// Steps with data.
     pub count: u64,

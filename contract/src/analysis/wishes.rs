@@ -12,7 +12,7 @@ use crate::geometry::AskedLine;
 use crate::grid::LonLatDeg;
 use crate::manifest::Manifest;
 use crate::product::ProductId;
-use crate::region::{AskedRegion, Region};
+use crate::region::AskedRegion;
 use crate::series::RegionSeriesQuery;
 use crate::statistics::MinCoverage;
 use crate::time::{TimeMs, TimeStep};
@@ -97,7 +97,7 @@ impl AnalysisWishes {
 }
 
 /// How two series are compared.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct CorrelationWishes {
     /// What they are compared in.
     pub step: Option<TimeStep>,
@@ -105,6 +105,8 @@ pub struct CorrelationWishes {
     pub deseasonalise: Option<bool>,
     /// Most steps that one is moved against the other.
     pub max_lag: Option<u32>,
+    /// Least share of a region's sea, or of a line, that a step of either must hold data over.
+    pub min_coverage: Option<MinCoverage>,
 }
 
 impl CorrelationWishes {
@@ -120,6 +122,7 @@ impl CorrelationWishes {
         Ok(CorrelationQuery {
             step: self.step.unwrap_or(AnalysisOptions::USUAL_STEP),
             deseasonalise: self.deseasonalise.unwrap_or_default(),
+            min_coverage: self.min_coverage.unwrap_or_default(),
             ..CorrelationQuery::new(series, with, self.max_lag.unwrap_or_default())?
         })
     }
@@ -148,8 +151,8 @@ impl DifferenceWishes {
 pub struct HovmollerWishes {
     /// Height or width of a band, degrees.
     pub band_deg: Option<f64>,
-    /// A box: cells whose middles lie in it.
-    pub region: Option<Region>,
+    /// A box, of which cells count whose middles lie in it, or polygons, which count by their share of every cell.
+    pub region: Option<AskedRegion>,
     /// What a row covers.
     pub step: Option<TimeStep>,
     /// First instant.
@@ -158,25 +161,24 @@ pub struct HovmollerWishes {
     pub to: Option<TimeMs>,
     /// Figure of the earth.
     pub earth: Option<Earth>,
+    /// Least coverage of a mean of a band.
+    pub min_coverage: Option<MinCoverage>,
 }
 
 impl HovmollerWishes {
     /// Bands of a product that lie along latitude or longitude.
-    ///
-    /// # Errors
-    /// A region that is no box.
-    pub fn query(self, product: ProductId, along: Along) -> Result<HovmollerQuery, ContractError> {
-        let bounds_deg = self.region.map(|region| region.as_box()).transpose()?;
-        Ok(HovmollerQuery {
+    pub fn query(self, product: ProductId, along: Along) -> HovmollerQuery {
+        HovmollerQuery {
             product,
             along,
             band_deg: self.band_deg,
-            bounds_deg: bounds_deg.flatten(),
+            region: self.region,
             step: self.step.unwrap_or(AnalysisOptions::USUAL_STEP),
             from: self.from,
             to: self.to,
             earth: self.earth.unwrap_or_default(),
-        })
+            min_coverage: self.min_coverage.unwrap_or_default(),
+        }
     }
 }
 
@@ -265,7 +267,7 @@ mod tests {
         let query = CorrelationWishes::default().query(series(), with.clone());
         assert_eq!(query, CorrelationQuery::new(series(), with, 0));
         let whole = HovmollerWishes::default().query("sst".parse().unwrap(), Along::Lat);
-        assert_eq!(whole.unwrap().bounds_deg, None);
+        assert_eq!((whole.region, whole.min_coverage.percent()), (None, 0.0));
     }
 
     #[test]
@@ -288,10 +290,24 @@ mod tests {
             step: Some(TimeStep::Year),
             deseasonalise: Some(true),
             max_lag: Some(3),
+            min_coverage: "8".parse().ok(),
         };
-        let query = compared.query(series(), "ice".parse().unwrap()).unwrap();
+        let query = compared.clone().query(series(), "ice".parse().unwrap());
+        let query = query.unwrap();
         let how = (query.step, query.deseasonalise, query.max_lag);
         assert_eq!(how, (TimeStep::Year, true, 3));
+        assert_eq!(Some(query.min_coverage), compared.min_coverage);
+        let polygon: AskedRegion = "POLYGON((0 0,9 0,0 9,0 0))".parse().unwrap();
+        let bands = HovmollerWishes {
+            region: Some(polygon.clone()),
+            min_coverage: "9".parse().ok(),
+            ..HovmollerWishes::default()
+        };
+        let query = bands.query("sst".parse().unwrap(), Along::Lon);
+        assert_eq!(
+            (query.region, Some(query.min_coverage)),
+            (Some(polygon), "9".parse().ok())
+        );
         let taken = SeriesWishes {
             region: Some("14n-50n".parse().unwrap()),
             from: "2001".parse().ok(),

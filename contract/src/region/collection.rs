@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use geojson::feature::Id;
 use geojson::{Feature, GeoJson};
 
-use super::text::{checked, collect};
+use super::text::{checked, collected};
 use super::{AskedRegion, Region};
 use crate::ContractError;
 use crate::geometry_text::document;
@@ -44,10 +44,8 @@ fn read(text: &str) -> Result<Vec<AskedRegion>, String> {
         if !names.insert(name.clone()) {
             return Err(format!("two features are called {name:?}"));
         }
-        let mut polygons = vec![];
-        if let Some(geometry) = &feature.geometry {
-            collect(geometry, 0, &mut polygons).map_err(|reason| format!("{name:?}: {reason}"))?;
-        }
+        let polygons =
+            collected(&feature.geometry).map_err(|reason| format!("{name:?}: {reason}"))?;
         let polygons = checked(polygons).map_err(|reason| format!("{name:?}: {reason}"))?;
         regions.push(AskedRegion {
             region: Region::Polygons(polygons),

@@ -12,6 +12,8 @@ use crate::geometry_text::{document, within_limit};
 
 /// Deepest nesting of geometry collections.
 const MAX_DEPTH: usize = 8;
+/// Why a polygon without a corner is no region.
+const EMPTY: &str = "the polygon is empty";
 /// First words of well-known text; those without area are refused by name.
 const WKT_WORDS: [&str; 9] = [
     "POLYGON",
@@ -57,29 +59,33 @@ pub(super) fn checked(polygons: Vec<Polygon>) -> Result<Vec<Polygon>, String> {
 
 /// A geometry, a feature or a collection of features: their polygons together.
 fn geojson_polygons(text: &str) -> Result<Vec<Polygon>, String> {
-    let mut polygons = vec![];
     match &document(text)? {
-        GeoJson::Geometry(geometry) => collect(geometry, 0, &mut polygons)?,
-        GeoJson::Feature(feature) => {
-            let mut geometry = feature.geometry.iter();
-            geometry.try_for_each(|geometry| collect(geometry, 0, &mut polygons))?;
-        }
+        GeoJson::Geometry(geometry) => collected([geometry]),
+        GeoJson::Feature(feature) => collected(&feature.geometry),
         GeoJson::FeatureCollection(collection) => {
-            let mut geometries = collection
-                .features
-                .iter()
-                .filter_map(|feature| feature.geometry.as_ref());
-            geometries.try_for_each(|geometry| collect(geometry, 0, &mut polygons))?;
+            let features = collection.features.iter();
+            collected(features.filter_map(|feature| feature.geometry.as_ref()))
         }
+    }
+}
+
+/// The polygons of some geometries together; none of no geometry.
+pub(super) fn collected<'a>(
+    geometries: impl IntoIterator<Item = &'a Geometry>,
+) -> Result<Vec<Polygon>, String> {
+    let (mut polygons, mut count) = (vec![], 0);
+    for geometry in geometries {
+        collect(geometry, 0, &mut polygons)?;
+        count += 1;
+    }
+    // What has no area is refused: what is left without a polygon are lists of none.
+    if polygons.is_empty() && count > 0 {
+        return Err(EMPTY.to_owned());
     }
     Ok(polygons)
 }
 
-pub(super) fn collect(
-    geometry: &Geometry,
-    depth: usize,
-    polygons: &mut Vec<Polygon>,
-) -> Result<(), String> {
+fn collect(geometry: &Geometry, depth: usize, polygons: &mut Vec<Polygon>) -> Result<(), String> {
     match &geometry.value {
         GeometryValue::Polygon { coordinates } => polygons.push(geojson_polygon(coordinates)?),
         GeometryValue::MultiPolygon { coordinates } => {
@@ -116,8 +122,8 @@ fn geojson_polygon(rings: &[Vec<Position>]) -> Result<Polygon, String> {
 
 /// The first ring is the outer one.
 fn polygon(mut rings: Vec<Vec<[f64; 2]>>) -> Result<Polygon, String> {
-    if rings.is_empty() {
-        return Err("a polygon has no ring".to_owned());
+    if rings.first().is_none_or(Vec::is_empty) {
+        return Err(EMPTY.to_owned());
     }
     let outer = rings.remove(0);
     Ok(Polygon {
@@ -134,6 +140,9 @@ fn wkt_polygons(word: &str, text: &str) -> Result<Vec<Polygon>, String> {
     }
     if !word.trim_end_matches(['Z', 'M']).ends_with("POLYGON") {
         return Err(no_area(word));
+    }
+    if is_empty(text) {
+        return Err(EMPTY.to_owned());
     }
     if !is_one_expression(text) {
         return Err(
@@ -158,6 +167,14 @@ fn wkt_polygon(rings: &[LineString<f64>]) -> Result<Polygon, String> {
     let corner = |corner: &Coord<f64>| [corner.x, corner.y];
     let ring = |ring: &LineString<f64>| ring.coords().iter().map(corner).collect();
     polygon(rings.iter().map(ring).collect())
+}
+
+/// Does a text say that there is nothing: `POLYGON EMPTY`, `MULTIPOLYGON Z (EMPTY)`?
+fn is_empty(text: &str) -> bool {
+    let words = text.split(|c: char| c.is_whitespace() || "(,)".contains(c));
+    let mut words = words.filter(|word| !word.is_empty()).skip(1).peekable();
+    let is_word = |word: &str| ["EMPTY", "Z", "M", "ZM"].contains(&&*word.to_ascii_uppercase());
+    words.peek().is_some() && words.all(is_word)
 }
 
 /// Is the bracket that is opened first closed at the very end? The parser would leave out what follows.
@@ -233,7 +250,6 @@ mod tests {
         assert!(reason("{}").contains("no GeoJSON"));
         assert!(reason(r#"{"type":"Point","coordinates":[0,0]}"#).contains("a Point has no area"));
         assert!(reason(r#"{"type":"FeatureCollection","features":[]}"#).contains("no Polygon"));
-        assert!(reason(r#"{"type":"Polygon","coordinates":[]}"#).contains("no ring"));
         let short = r#"{"type":"Polygon","coordinates":[[[0],[1,0],[2,2]]]}"#;
         assert!(reason(short).contains("fewer than two numbers"));
         assert!(reason("POINT(0 0)").contains("a POINT has no area"));
@@ -242,7 +258,32 @@ mod tests {
         assert!(reason("SRID=3857;POLYGON((0 0,1 0,1 1,0 0))").contains("EPSG:4326"));
         assert!(reason("POLYGON((0 0,1 0").contains("does not end"));
         assert!(reason("POLYGON((0 zero,1 0,1 1,0 0))").contains("no well-known text"));
-        assert!(reason("POLYGON EMPTY").contains("does not end"));
+    }
+
+    #[test]
+    fn a_polygon_without_a_corner_is_told_to_be_empty() {
+        for text in [
+            "POLYGON EMPTY",
+            "polygon z empty",
+            "MULTIPOLYGON EMPTY",
+            " MULTIPOLYGON (EMPTY) ",
+            "POLYGON(EMPTY)",
+            r#"{"type":"Polygon","coordinates":[]}"#,
+            r#"{"type":"Polygon","coordinates":[[]]}"#,
+            r#"{"type":"MultiPolygon","coordinates":[]}"#,
+            r#"{"type":"MultiPolygon","coordinates":[[[[0,0],[1,0],[1,1],[0,0]]],[]]}"#,
+            r#"{"type":"Feature","properties":null,"geometry":{"type":"Polygon","coordinates":[]}}"#,
+            r#"{"type":"GeometryCollection","geometries":[]}"#,
+        ] {
+            let told = reason(text);
+            assert!(told.contains("the polygon is empty"), "{text}: {told}");
+        }
+        let unknown = reason(r#"{"type":"Feature","properties":null,"geometry":null}"#);
+        assert!(unknown.contains("no Polygon"), "{unknown}");
+        // An empty list beside polygons adds nothing to them.
+        let none = r#"{"type":"MultiPolygon","coordinates":[]}"#;
+        let beside = format!(r#"{{"type":"GeometryCollection","geometries":[{none},{SQUARE}]}}"#);
+        assert_eq!(polygon_count(&beside), 1);
     }
 
     #[test]

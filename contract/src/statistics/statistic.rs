@@ -77,7 +77,8 @@ pub enum Statistic {
     Min,
     /// Largest value.
     Max,
-    /// Standard deviation by weight and time, of the population: its divisor is all weight.
+    /// Standard deviation by weight and time, of the values as they are (the population): √(Σ w (x - m)² / Σ w), w weight times time. Its
+    /// divisor is all weight, and not one less than a number of values, as that of a climatology's spread is.
     Std,
     /// The 50th percentile.
     Median,

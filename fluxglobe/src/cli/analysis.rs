@@ -23,7 +23,7 @@ const HEADING: &str = "Made of the series";
 #[derive(Debug, Args)]
 #[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
 pub(crate) struct Analysis {
-    /// Mean, spread and count of each part of the year (--bins) over the years of --base.
+    /// Mean, spread and count of each part of the year (--bins) over the years of --base. A spread is that of a sample, √(Σ (x - m)² / (n - 1)).
     #[arg(long, help_heading = HEADING)]
     climatology: bool,
     /// How far each step is from that climatology: in the unit, and in spreads of its part of the year.
@@ -123,6 +123,10 @@ pub(crate) struct StatsCorrelate {
     /// Take the mean of each calendar month off both first: two series with seasons always go together.
     #[arg(long)]
     pub(crate) deseasonalise: bool,
+    /// Least coverage, percent: steps of either that hold data over less of the region's sea, or of the line, are left out, and how many is
+    /// said. 0 if absent.
+    #[arg(long, value_name = "PERCENT")]
+    pub(crate) min_coverage: Option<MinCoverage>,
     /// First instant: 2000, 2000-03, 2000-03-15 or with a time of day. The products' own if absent.
     #[arg(long)]
     pub(crate) from: Option<TimeMs>,
@@ -160,6 +164,10 @@ pub(crate) struct StatsDifference {
     pub(crate) minus_manifest: Option<ManifestId>,
     #[command(flatten)]
     pub(crate) place: Place,
+    /// Least coverage, percent: steps of either that hold data over less of the region's sea, or of the line, are left out, and how many is
+    /// said. 0 if absent.
+    #[arg(long, value_name = "PERCENT")]
+    pub(crate) min_coverage: Option<MinCoverage>,
     /// Figure of the earth for areas and lengths: wgs84, sphere (R = 6371 km) or local-radius (as FluxEngine sums).
     #[arg(long, default_value = "wgs84")]
     pub(crate) earth: Earth,
@@ -177,15 +185,21 @@ pub(crate) struct StatsHovmoller {
     /// What bands lie along: `lat`, means over longitude, or `lon`, means over latitude.
     #[arg(long, value_name = "lat|lon")]
     pub(crate) along: Along,
-    /// Height or width of a band, degrees. The least of 1, 2, 5, 10 that is no less than a cell if absent.
+    /// Height or width of a band, degrees, no less than a cell. The least of 1, 2, 5, 10 that is no less than a cell if absent.
     #[arg(long, value_name = "DEGREES")]
     pub(crate) band: Option<f64>,
     /// What a row covers; months if absent. `total` is the profile of the bands over all the period.
     #[arg(long, value_name = STEPS)]
     pub(crate) step: Option<TimeStep>,
-    /// `global`, a named region that is a box, or WEST,SOUTH,EAST,NORTH: cells whose middles lie in it.
+    /// `global`, a named region, a box WEST,SOUTH,EAST,NORTH, a GeoJSON or WKT file, the text of one, or MASK:CODE, the cells where a
+    /// landed mask has a code, or what it means: basins:5, basins:southern. Of a box the cells count whose middles lie in it, of all else
+    /// every cell by its share. All of the grid if absent.
     #[arg(long, allow_hyphen_values = true)]
     pub(crate) region: Option<String>,
+    /// Least coverage, percent: means of bands with less are left out, and how many is said; of a box a share of the band's cells that ever
+    /// hold data, of all else of the region's sea in the band. 0 if absent.
+    #[arg(long, value_name = "PERCENT")]
+    pub(crate) min_coverage: Option<MinCoverage>,
     /// First instant: 2000, 2000-03, 2000-03-15 or with a time of day. The product's first if absent.
     #[arg(long)]
     pub(crate) from: Option<TimeMs>,

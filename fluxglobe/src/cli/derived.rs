@@ -40,7 +40,8 @@ pub(crate) struct DeriveStatistic {
     #[arg(long)]
     pub(crate) product: ProductId,
     /// One or more, separated by commas; the product is read once for all: mean, min, max, median, p97.5 and the like,
-    /// min-time and max-time (when), count and coverage (steps and share of the time with data), spread (standard deviation),
+    /// min-time and max-time (when), count and coverage (steps and share of the time with data), spread (standard deviation of
+    /// the steps as of a sample, divisor n - 1),
     /// climatology (a step a month or season), anomaly (every step, or every mean of a --step, less the climatology), amplitude and
     /// phase of the year's wave,
     /// trend (Theil-Sen), trend-p-value (Mann-Kendall, Hamed-Rao with the autocorrelation of neighbouring steps), least-squares-trend, least-squares-trend-p-value; together with

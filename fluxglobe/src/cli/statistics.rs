@@ -33,7 +33,8 @@ pub(crate) enum Stats {
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Statistics")]
 pub(crate) struct StatisticsOptions {
-    /// Statistics, separated by commas: mean, sum, min, max, std, median, count, coverage, and percentiles such as p90 or p97.5.
+    /// Statistics, separated by commas: mean, sum, min, max, std, median, count, coverage, and percentiles such as p90 or p97.5. The standard
+    /// deviation std is that of the values as they are, by their weights: √(Σ w (x - m)² / Σ w).
     #[arg(long, value_name = "mean,p90,...")]
     pub(crate) statistic: Option<Statistics>,
     /// What a row covers. Steps that lie in several rows count in each by their time there.

@@ -12,6 +12,7 @@ use contract::manifest::{AskedVersion, Manifest, ManifestId};
 use storage::Store;
 
 use crate::cli::{PlotFile, Settings, StatsHovmoller};
+use crate::command::budget::stored_region;
 use crate::{deployment, plot, progress};
 
 pub(crate) use together::{correlate, difference, series};
@@ -69,18 +70,25 @@ pub(crate) async fn of_series(
 pub(crate) async fn hovmoller(settings: &Settings, options: &StatsHovmoller) -> Result<()> {
     let store = deployment::store(settings)?;
     let manifest = deployment::version(&store, &options.product, &settings.data).await?;
+    let region = match &options.region {
+        Some(text) => Some(stored_region(settings, &store, text).await?),
+        None => None,
+    };
     let wishes = HovmollerWishes {
         band_deg: options.band,
-        region: options.region.as_deref().map(str::parse).transpose()?,
+        region,
         step: options.step,
         from: options.from,
         to: options.to,
         earth: Some(options.earth),
+        min_coverage: options.min_coverage,
     };
-    let query = wishes.query(manifest.product.clone(), options.along)?;
+    let query = wishes.query(manifest.product.clone(), options.along);
     let bar = progress::bar("means of bands", 1);
     let version = (&manifest, &manifest.id());
-    let answer: Hovmoller = compute::analysis::hovmoller(&store, version, &query).await?;
+    // Whole steps are read in this process, one after the other.
+    let engine = Engine::local(store);
+    let answer: Hovmoller = compute::analysis::hovmoller(&engine, version, &query).await?;
     bar.finish_and_clear();
     if let Some(file) = &options.plot {
         plot::write(file, &plot::of_hovmoller(&answer)?)?;
@@ -89,13 +97,20 @@ pub(crate) async fn hovmoller(settings: &Settings, options: &StatsHovmoller) -> 
         return progress::result(&serde_json::to_string_pretty(&answer)?);
     }
     progress::result(&tables::of_hovmoller(&answer))?;
+    let cell = match &answer.region {
+        Some(region) => format!("each cell by its share of {region}"),
+        None => "each cell by its area".to_owned(),
+    };
     let bands = format!(
-        "means of {} bands of {} degrees, each cell by its area on the {} earth",
+        "means of {} bands of {} degrees, {cell} on the {} earth",
         answer.bands.len(),
         answer.band_deg,
         answer.earth
     );
     say_source(&answer.cited, &bands, "a hole is a band without data");
+    for note in &answer.notes {
+        progress::say(&format!("note: {note}"));
+    }
     Ok(())
 }
 

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use contract::analysis::SeriesAnalysis;
+use contract::analysis::{Hovmoller, SeriesAnalysis};
 use contract::cited::Cited;
 use contract::time::{Period, TimeMs};
 use plotters::chart::ChartContext;
@@ -39,6 +39,12 @@ pub(super) fn named(region: &str) -> String {
     } else {
         short
     }
+}
+
+/// The polygons that bands are made of, for people; nothing of a box, which is told by its bounds.
+pub(super) fn shares_of(answer: &Hovmoller) -> String {
+    let region = answer.region.as_deref();
+    region.map_or_else(String::new, |region| format!(" of {}", named(region)))
 }
 
 /// Where a series is taken, for people.

@@ -9,6 +9,7 @@ use plotters::prelude::{
     TextStyle,
 };
 
+use super::chart::shares_of;
 use super::marked::Marked;
 use super::page::{self, Area, Failed, SIZE, Words, with_unit};
 use super::time_axis::TimeAxis;
@@ -84,8 +85,11 @@ pub(super) fn drawn(answer: &Hovmoller) -> Result<String> {
     };
     let [west, south, east, north] = answer.bounds_deg;
     let below = format!(
-        "means of bands of {} degrees and steps of {}, {west} to {east} degrees east, {south} to {north} degrees north; gray: no data",
-        answer.band_deg, answer.step
+        "means of bands of {} degrees{} and steps of {}, {west} to {east} degrees east, {south} to {north} degrees north; gray: {}",
+        answer.band_deg,
+        shares_of(answer),
+        answer.step,
+        no_data(answer)
     );
     let words = Words::of(&answer.cited, what, below);
     let colours = Colours::of(answer);
@@ -94,6 +98,15 @@ pub(super) fn drawn(answer: &Hovmoller) -> Result<String> {
         chart(&left, answer, &colours)?;
         bar(&right, answer, &colours)
     })
+}
+
+/// What a band without a mean is.
+fn no_data(answer: &Hovmoller) -> String {
+    if answer.left_out_count == 0 {
+        return "no data".to_owned();
+    }
+    let least = answer.min_coverage_percent;
+    format!("no data, or a coverage of less than {least} %")
 }
 
 fn chart(area: &Area<'_>, answer: &Hovmoller, colours: &Colours) -> Result<(), Failed> {

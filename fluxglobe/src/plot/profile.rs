@@ -4,6 +4,7 @@ use anyhow::Result;
 use contract::analysis::{Along, Hovmoller, HovmollerRow};
 use plotters::prelude::{BLACK, ChartBuilder, Circle, Color as _, LineSeries, Polygon};
 
+use super::chart::shares_of;
 use super::page::{self, Area, COLOURS, Failed, Words, range, with_unit};
 
 /// Bands up to which each is marked by a dot.
@@ -19,9 +20,10 @@ pub(super) fn drawn(answer: &Hovmoller, row: &HovmollerRow) -> Result<String> {
     };
     let [west, south, east, north] = answer.bounds_deg;
     let below = format!(
-        "bands of {} degrees, {west} to {east} degrees east, {south} to {north} degrees north: mean, and one standard deviation by area \
+        "bands of {} degrees{}, {west} to {east} degrees east, {south} to {north} degrees north: mean, and one standard deviation by area \
          and time on either side",
-        answer.band_deg
+        answer.band_deg,
+        shares_of(answer)
     );
     let words = Words::of(&answer.cited, what, below);
     page::drawn(&words, |area| on(area, answer, row))

@@ -161,12 +161,20 @@ fn bands_against_time_have_the_colours_of_the_quantity_and_a_bar_of_them() {
     };
     let rows: Vec<Value> = (0..24).map(row).collect();
     let band = |low: f64| json!({"low_deg": low, "high_deg": low + 30.0, "area_m2": 1e12});
-    let made = json!({"along": "lat", "band_deg": 30.0, "bounds_deg": [-180.0, -30.0, 180.0, 60.0],
-        "step": "month", "earth": "wgs84", "bands": [band(-30.0), band(0.0), band(30.0)], "rows": rows});
-    let svg = of_hovmoller(&serde_json::from_value(cited(made)).unwrap()).unwrap();
+    let mut made = json!({"along": "lat", "band_deg": 30.0, "bounds_deg": [-180.0, -30.0, 180.0, 60.0],
+        "step": "month", "earth": "wgs84", "coverage_basis": "cells", "notes": [],
+        "bands": [band(-30.0), band(0.0), band(30.0)], "rows": rows});
+    let svg = of_hovmoller(&serde_json::from_value(cited(made.clone())).unwrap()).unwrap();
     is_told(&svg);
     assert!(svg.contains("degrees north") && svg.contains("2002-01"));
     assert_eq!(svg.matches("fill=\"#D6D6D6\"").count(), 24);
+    assert!(svg.contains("gray: no data") && !svg.contains("coverage"));
+    made["region"] = json!("basins@1-0a1b2c3d:30 (north)");
+    made["min_coverage_percent"] = json!(40.0);
+    made["left_out_count"] = json!(24);
+    let svg = of_hovmoller(&serde_json::from_value(cited(made)).unwrap()).unwrap();
+    assert!(svg.contains("degrees of basins@1-0a1b2c3d:30 (north) and steps"));
+    assert!(svg.contains("coverage of less than 40 %"));
 }
 
 #[test]
@@ -178,7 +186,7 @@ fn the_whole_period_of_bands_is_a_profile_with_its_spread_broken_where_nothing_i
         "coverage_percent": [100.0, 50.0, 0.0, 75.0]}),
     ];
     let made = json!({"along": "lat", "band_deg": 30.0, "bounds_deg": [-180.0, -60.0, 180.0, 60.0],
-        "step": "total", "earth": "wgs84", "bands": bands, "rows": rows});
+        "step": "total", "earth": "wgs84", "coverage_basis": "cells", "notes": [], "bands": bands, "rows": rows});
     let svg = of_hovmoller(&serde_json::from_value(cited(made)).unwrap()).unwrap();
     is_told(&svg);
     assert!(svg.contains("profile of latitude") && svg.contains("degrees north"));

@@ -41,23 +41,33 @@ fn asked(question: &SeriesQuestion) -> Value {
             query.step,
             query.deseasonalise,
             query.max_lag,
+            query.min_coverage,
         ]),
-        SeriesQuestion::Difference { of, minus } => json!([
+        SeriesQuestion::Difference {
+            of,
+            minus,
+            min_coverage,
+        } => json!([
             "difference",
             of.0.id,
             where_and_when(&of.1),
             minus.0.id,
             where_and_when(&minus.1),
+            min_coverage,
         ]),
         SeriesQuestion::Hovmoller { of, query } => json!([
             "hovmoller",
             of.id,
             query.along,
             query.band_deg,
-            query.bounds_deg,
+            query
+                .region
+                .as_ref()
+                .map(|asked| (Digest::of_json(&asked.region), &asked.name)),
             query.step,
             [query.from, query.to],
             query.earth,
+            query.min_coverage,
         ]),
     }
 }

@@ -32,6 +32,10 @@ pub(crate) struct CorrelationParameters {
     /// `true`: the mean of each calendar month is taken off both first.
     #[param(value_type = Option<bool>)]
     deseasonalise: Option<String>,
+    /// Least coverage, percent: steps of either that hold data over less of the region's sea, or of the line, are left out, and the answer
+    /// says how many; 0 unless told otherwise.
+    #[param(value_type = Option<f64>, minimum = 0, maximum = 100)]
+    min_coverage: Option<String>,
     /// Longitude of a cell, degrees east, -180 to 360; with `lat`, in place of a region.
     #[param(value_type = Option<f64>)]
     lon: Option<String>,
@@ -150,6 +154,7 @@ async fn answered(
         max_lag: max_lag
             .map(|text| whole_number("max_lag", text, "a whole number, 0 to 400"))
             .transpose()?,
+        min_coverage: parsed(asked.min_coverage.as_deref())?,
     };
     let query = wishes.query(series, with.manifest.product.clone())?;
     let (of, with) = (version(&of), version(&with));

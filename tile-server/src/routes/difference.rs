@@ -29,6 +29,10 @@ pub(crate) struct DifferenceParameters {
     minus_period: Option<String>,
     /// Its version; the newest unless one is given.
     minus_manifest: Option<String>,
+    /// Least coverage, percent: steps of either that hold data over less of the region's sea, or of the line, are left out, and the answer
+    /// says how many; 0 unless told otherwise.
+    #[param(value_type = Option<f64>, minimum = 0, maximum = 100)]
+    min_coverage: Option<String>,
     /// Longitude of a cell, degrees east, -180 to 360; with `lat`, in place of a region.
     #[param(value_type = Option<f64>)]
     lon: Option<String>,
@@ -129,6 +133,7 @@ async fn answered(
     let question = SeriesQuestion::Difference {
         of: (version(&of), series),
         minus: (version(&minus), other),
+        min_coverage: parsed(asked.min_coverage.as_deref())?.unwrap_or_default(),
     };
     answer(state, question).await
 }

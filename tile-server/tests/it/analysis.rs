@@ -71,7 +71,7 @@ async fn every_parameter_of_an_analysis_reaches_the_analyst_once() {
 #[tokio::test]
 async fn two_series_and_bands_are_asked_for_with_what_belongs_to_them() {
     let app = TestApp::new().await;
-    let path = "/api/products/sst/correlation?with=flux&region=global&max_lag=7&step=native&deseasonalise=true";
+    let path = "/api/products/sst/correlation?with=flux&region=global&max_lag=7&step=native&deseasonalise=true&min_coverage=40";
     assert_eq!(app.get(path).await.json()["second"]["product"], "flux");
     let SeriesQuestion::Correlation { query, .. } = last(&app) else {
         panic!("another question");
@@ -80,11 +80,19 @@ async fn two_series_and_bands_are_asked_for_with_what_belongs_to_them() {
         (query.max_lag, query.step, query.deseasonalise),
         (7, TimeStep::Native, true)
     );
-    let path = "/api/products/sst/difference?region=global&period=2000/2000&minus_period=2000/2001";
+    let forty = "40".parse().ok();
+    assert_eq!(Some(query.min_coverage), forty);
+    let path = "/api/products/sst/difference?region=global&period=2000/2000&minus_period=2000/2001&min_coverage=40";
     assert_eq!(app.get(path).await.status, StatusCode::OK);
-    let SeriesQuestion::Difference { of, minus } = last(&app) else {
+    let SeriesQuestion::Difference {
+        of,
+        minus,
+        min_coverage,
+    } = last(&app)
+    else {
         panic!("another question");
     };
+    assert_eq!(Some(min_coverage), forty);
     assert_eq!(of.0.id, minus.0.id);
     assert_eq!(of.1.window().1, "2001".parse().ok());
     assert_eq!(minus.1.window().1, "2002".parse().ok());
@@ -101,7 +109,14 @@ async fn two_series_and_bands_are_asked_for_with_what_belongs_to_them() {
         (query.along, query.band_deg, query.step),
         (Along::Lon, Some(5.0), TimeStep::Year)
     );
-    assert_eq!(query.bounds_deg, Some([100.0, 0.0, 130.0, 41.0]));
+    assert_eq!(query.region, "100,0,130,41".parse().ok());
+    let path = "/api/products/sst/hovmoller?along=lat&region=equatorial-pacific&min_coverage=40";
+    assert_eq!(app.get(path).await.status, StatusCode::OK);
+    let SeriesQuestion::Hovmoller { query, .. } = last(&app) else {
+        panic!("another question");
+    };
+    let asked = (query.region, Some(query.min_coverage));
+    assert_eq!(asked, ("equatorial-pacific".parse().ok(), forty));
 }
 
 #[tokio::test]
@@ -148,10 +163,14 @@ async fn what_cannot_be_asked_is_refused_with_what_can() {
         ("hovmoller", "lat or lon"),
         ("hovmoller?along=depth", "depth"),
         ("hovmoller?along=lat&band=wide", "wide"),
+        ("hovmoller?along=lat&region=POLYGON%20EMPTY", "is empty"),
+        ("hovmoller?along=lat&region=0,0,400,10", "400 degrees wide"),
+        ("hovmoller?along=lat&min_coverage=101", "0 to 100"),
         (
-            "hovmoller?along=lat&region=POLYGON((0%200,1%200,0%201,0%200))",
-            "need a box",
+            "correlation?region=global&with=flux&min_coverage=half",
+            "0 to 100",
         ),
+        ("difference?region=global&min_coverage=-1", "0 to 100"),
     ] {
         let refused = app.get(&format!("/api/products/sst/{path}")).await;
         assert_eq!(refused.status, StatusCode::BAD_REQUEST, "{path}");

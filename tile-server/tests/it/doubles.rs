@@ -464,9 +464,9 @@ impl Analyse for Analyst {
             SeriesQuestion::Correlation { of: a, with: b, .. } => {
                 MadeOfSeries::Correlation(serde_json::from_value(correlation(a, b)).unwrap())
             }
-            SeriesQuestion::Difference { of: a, minus: b } => {
-                MadeOfSeries::Difference(serde_json::from_value(difference(&a.0, &b.0)).unwrap())
-            }
+            SeriesQuestion::Difference {
+                of: a, minus: b, ..
+            } => MadeOfSeries::Difference(serde_json::from_value(difference(&a.0, &b.0)).unwrap()),
             SeriesQuestion::Hovmoller { of: version, .. } => {
                 MadeOfSeries::Hovmoller(serde_json::from_value(hovmoller(version)).unwrap())
             }
@@ -550,7 +550,7 @@ fn hovmoller(of: &Version) -> Value {
     cited(
         of,
         json!({"along": "lat", "band_deg": 90.0, "bounds_deg": [-180.0, -90.0, 180.0, 90.0],
-        "step": "month", "earth": "wgs84", "bands": [{"low_deg": -90.0, "high_deg": 0.0, "area_m2": 2.5e14},
+        "step": "month", "earth": "wgs84", "coverage_basis": "cells", "notes": ["a note"], "bands": [{"low_deg": -90.0, "high_deg": 0.0, "area_m2": 2.5e14},
             {"low_deg": 0.0, "high_deg": 90.0, "area_m2": 0.0}],
         "rows": [{"start": "2000-01-01T00:00:00Z", "end": "2000-02-01T00:00:00Z", "means": [1.5, null],
             "coverage_percent": [100.0, 0.0]}]}),

@@ -10,12 +10,13 @@ use crate::app::TestApp;
 /// What those take while they are asked about.
 const HELD: &str = "fluxglobe_tile_server_body_bytes";
 /// Addresses that take a region.
-const TAKES: [&str; 7] = [
+const TAKES: [&str; 8] = [
     "sst/area?",
     "sst/area?statistic=mean&step=total&",
     "sst/analysis?parts=anomaly&",
     "sst/correlation?with=flux&max_lag=2&",
     "sst/difference?minus=flux&",
+    "sst/hovmoller?along=lat&",
     "flux/budget?step=month&",
     "flux/budget/history?",
 ];
@@ -26,7 +27,9 @@ fn name(made: &SeriesQuestion) -> String {
         SeriesQuestion::Analysis { series, .. } => series,
         SeriesQuestion::Correlation { query, .. } => &query.series,
         SeriesQuestion::Difference { of, .. } => &of.1,
-        SeriesQuestion::Hovmoller { .. } => panic!("it has no region"),
+        SeriesQuestion::Hovmoller { query, .. } => {
+            return query.region.as_ref().unwrap().name.clone();
+        }
     };
     match series {
         SeriesQuery::Region(query) => query.region_name.clone(),
@@ -80,7 +83,7 @@ async fn a_code_of_a_mask_is_a_region_wherever_one_is_taken() {
     // Looked up once, and the same question however it is written.
     assert_eq!(asked(&app), ["basins@1:5"]);
     assert_eq!(app.analyst.areas.lock().unwrap().len(), 1);
-    assert_eq!(app.analyst.made.lock().unwrap().len(), 3);
+    assert_eq!(app.analyst.made.lock().unwrap().len(), 4);
     assert_eq!(app.analyst.budgets.lock().unwrap().len(), 2);
     for (code, told) in [
         ("12345", "12345"),

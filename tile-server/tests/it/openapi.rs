@@ -278,12 +278,13 @@ async fn every_answer_is_as_described() {
 }
 
 /// Addresses that take a geometry, a question to each, and what is sent along.
-const SENT: [(&str, &str, &str); 7] = [
+const SENT: [(&str, &str, &str); 8] = [
     ("area", "sst/area", SQUARE),
     ("line", "sst/line", TRACK),
     ("analysis", "sst/analysis?parts=trend", TRACK),
     ("correlation", "sst/correlation?with=flux", TRACK),
     ("difference", "sst/difference?minus=flux", SQUARE),
+    ("hovmoller", "sst/hovmoller?along=lat", SQUARE),
     ("budget", "flux/budget", SQUARE),
     ("budget/history", "flux/budget/history", SQUARE),
 ];
@@ -319,7 +320,7 @@ async fn what_takes_a_geometry_is_described_and_answers_so() {
         let (by_get, by_post) = (named(&item["get"]), named(operation));
         let left_out: Vec<_> = by_get.difference(&by_post).map(String::as_str).collect();
         let wanted: &[&str] = match name {
-            "area" => &["region"],
+            "area" | "hovmoller" => &["region"],
             "line" => &["line"],
             "budget" | "budget/history" => &[],
             _ => &["lat", "line", "lon", "region"],

@@ -85,7 +85,7 @@ const QUESTIONS: [Question; 9] = [
         ],
     ),
     (
-        "sst/correlation?with=flux&region=global&max_lag=7&step=month&deseasonalise=false&from=2000-01&to=2000-03&earth=wgs84",
+        "sst/correlation?with=flux&region=global&max_lag=7&step=month&deseasonalise=false&min_coverage=0&from=2000-01&to=2000-03&earth=wgs84",
         &[
             ("with=flux", "with=mask"),
             ("global", "14n-50n"),
@@ -93,28 +93,35 @@ const QUESTIONS: [Question; 9] = [
             ("max_lag=7", "max_lag=8"),
             ("step=month", "step=year"),
             ("false", "true"),
+            ("min_coverage=0", "min_coverage=1"),
             ("from=2000-01", "from=2000-02"),
             ("to=2000-03", "to=2000-02"),
             ("wgs84", "sphere"),
         ],
     ),
     (
-        "sst/difference?region=global&period=2000/2000&minus=sst&minus_period=2000/2001&earth=wgs84",
+        "sst/difference?region=global&period=2000/2000&minus=sst&minus_period=2000/2001&min_coverage=0&earth=wgs84",
         &[
             ("global", "14n-50n"),
             ("region=global", "line=0,0;1,1"),
             ("&period=2000/2000", "&period=1999/2000"),
             ("minus=sst", "minus=other"),
             ("minus_period=2000/2001", "minus_period=2000/2002"),
+            ("min_coverage=0", "min_coverage=1"),
             ("wgs84", "sphere"),
         ],
     ),
     (
-        "sst/hovmoller?along=lat&band=10&region=100,0,130,40&step=month&from=2000-01&to=2000-03&earth=wgs84",
+        "sst/hovmoller?along=lat&band=10&region=100,0,130,40&step=month&min_coverage=0&from=2000-01&to=2000-03&earth=wgs84",
         &[
             ("along=lat", "along=lon"),
             ("band=10", "band=20"),
             ("130,40", "130,50"),
+            (
+                "100,0,130,40",
+                "POLYGON((100%200,130%200,130%2040,100%200))",
+            ),
+            ("min_coverage=0", "min_coverage=1"),
             ("step=month", "step=total"),
             ("from=2000-01", "from=2000-02"),
             ("to=2000-03", "to=2000-02"),

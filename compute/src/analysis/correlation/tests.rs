@@ -133,3 +133,32 @@ fn equal_values_have_no_correlation_whatever_they_are() {
         1e-6,
     );
 }
+
+#[test]
+fn why_there_is_no_correlation_is_told_at_each_lag() {
+    let why = |first: &[f64], second: &[f64], max_lag: u32| -> Vec<Option<String>> {
+        let rows = correlations(first, second, max_lag);
+        rows.into_iter().map(|row| row.undefined).collect()
+    };
+    let told = |text: &str| Some(text.to_owned());
+    let equal = [2.0; 30];
+    let of_side = |count: usize, side: &str| {
+        told(&format!(
+            "all {count} values of {side} are equal: a correlation is not defined"
+        ))
+    };
+    assert_eq!(
+        why(&SERIES, &equal, 1),
+        [29, 30, 29].map(|count| of_side(count, "the second series"))
+    );
+    assert_eq!(why(&equal, &SERIES, 0), [of_side(30, "the first series")]);
+    assert_eq!(why(&equal, &equal, 0), [of_side(30, "either series")]);
+    // At one lag alone: what varies lies beyond the other's end.
+    let late = [1.0, 1.0, 1.0, 7.0];
+    assert_eq!(
+        why(&[1.0, 2.0, 4.0, 3.0], &late, 1),
+        [of_side(3, "the second series"), None, None]
+    );
+    let few = told("a correlation of pairs needs 3 values, and there are 2");
+    assert_eq!(why(&SERIES[..2], &OTHER[..2], 0), [few]);
+}

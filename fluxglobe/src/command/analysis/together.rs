@@ -32,6 +32,7 @@ pub(crate) async fn correlate(settings: &Settings, options: &StatsCorrelate) -> 
         step: options.step,
         deseasonalise: Some(options.deseasonalise),
         max_lag: options.max_lag,
+        min_coverage: options.min_coverage,
     };
     let query = wishes.query(series, second.product.clone())?;
     let a = deployment::version(&store, first, &settings.data).await?;
@@ -87,6 +88,7 @@ pub(crate) async fn difference(settings: &Settings, options: &StatsDifference) -
         &engine,
         ((&of, &of_id), &of_series),
         ((&minus, &minus_id), &minus_series),
+        options.min_coverage.unwrap_or_default(),
     )
     .await?;
     bar.finish_and_clear();

@@ -247,7 +247,8 @@ export interface paths {
         /** Means of bands of latitude or longitude, step by step. */
         get: operations["hovmoller"];
         put?: never;
-        post?: never;
+        /** The same of a region that is sent along: the answer of GET with its text as `region`. */
+        post: operations["hovmoller_of"];
         delete?: never;
         options?: never;
         head?: never;
@@ -828,7 +829,7 @@ export interface components {
             mean: number | null;
             /**
              * Format: double
-             * @description Standard deviation of its steps, divided by one less than their number; none of fewer than two.
+             * @description Standard deviation of its steps, each once, as of a sample: √(Σ (x - m)² / (n - 1)); none of fewer than two.
              */
             spread: number | null;
             /**
@@ -867,7 +868,17 @@ export interface components {
             end: components["schemas"]["TimeMs"];
             /** @description The first product. */
             first: components["schemas"]["Cited"];
-            /** @description What may surprise. */
+            /** @description Steps of the first and of the second that hold data over less than that, and were left out. */
+            left_out_counts?: number[];
+            /**
+             * Format: double
+             * @description Least share of a region's sea, or of a line, that a step of either had to hold data over, percent.
+             */
+            min_coverage_percent?: number;
+            /**
+             * @description What may surprise: steps that cover little or were left out, lags without a correlation. What is said of one side alone begins with
+             *     `first` or `second`.
+             */
             notes: string[];
             /** @description One for each lag, from the second leading to the first leading. */
             rows: components["schemas"]["CorrelationRow"][];
@@ -912,6 +923,8 @@ export interface components {
              *     lags some pass by chance.
              */
             p_value: number | null;
+            /** @description Why there is none. */
+            undefined?: string;
         };
         /** @description A difference of two means over time. */
         Difference: components["schemas"]["SeriesPlace"] & {
@@ -920,9 +933,14 @@ export interface components {
              * @description Mean of the first less mean of the second, in the answer's unit; none where one side has no data.
              */
             difference: number | null;
+            /**
+             * Format: double
+             * @description Least share of a region's sea, or of a line, that a step of either side had to hold data over, percent.
+             */
+            min_coverage_percent?: number;
             /** @description What is taken off. */
             minus: components["schemas"]["DifferenceSide"];
-            /** @description What may surprise. */
+            /** @description What may surprise. What is said of one side alone begins with `of` or `minus`. */
             notes: string[];
             /** @description What something is taken off from. */
             of: components["schemas"]["DifferenceSide"];
@@ -943,7 +961,7 @@ export interface components {
         DifferenceSide: components["schemas"]["Cited"] & {
             /**
              * Format: int64
-             * @description Steps with data.
+             * @description Steps with data that were not left out.
              */
             count: number;
             /**
@@ -953,6 +971,11 @@ export interface components {
             effective_count: number | null;
             /** @description First instant after it. */
             end: components["schemas"]["TimeMs"];
+            /**
+             * Format: int64
+             * @description Steps that hold data over less than the least coverage, and were left out.
+             */
+            left_out_count?: number;
             /**
              * Format: double
              * @description Mean over time, each step by its length; none without data.
@@ -1044,20 +1067,36 @@ export interface components {
             band_deg: number;
             /** @description Bands from the south or the west. */
             bands: components["schemas"]["HovmollerBand"][];
-            /** @description West, south, east, north of the cells whose middles count. */
+            /** @description West, south, east, north of the cells whose middles count; of polygons of the cells that they touch. */
             bounds_deg: number[];
+            /** @description What coverage is a share of. */
+            coverage_basis: string;
             /** @description Figure of the earth for areas. */
             earth: components["schemas"]["Earth"];
+            /**
+             * Format: int64
+             * @description Means that were left out for that: there are data, and less than the least coverage.
+             */
+            left_out_count?: number;
+            /**
+             * Format: double
+             * @description Means of bands whose coverage is below this are left out, percent.
+             */
+            min_coverage_percent?: number;
+            /** @description What may surprise: how the region was taken, bands that it does not touch, means that were left out. */
+            notes: string[];
+            /** @description The region of polygons whose share of every cell counts; none of a box, of which cells count whole. */
+            region?: string;
             /** @description One for each step in the order of time. */
             rows: components["schemas"]["HovmollerRow"][];
             /** @description What a row covers (one row of all: the profile of bands); of months and years each step counts by the time that lies in it. */
             step: components["schemas"]["TimeStep"];
         };
-        /** @description A band: cells whose middles lie in it, its lower edge included. */
+        /** @description A band: cells whose middles lie in it, its lower edge included; of polygons their shares of these cells. */
         HovmollerBand: {
             /**
              * Format: double
-             * @description Area of its cells that hold data in some step, m².
+             * @description Area of its cells that hold data in some step, or of the region's shares of these, m².
              */
             area_m2: number;
             /**
@@ -1070,20 +1109,30 @@ export interface components {
              * @description Its southern or western edge, degrees.
              */
             low_deg: number;
+            /**
+             * Format: double
+             * @description Area of the region's sea in it on the grid, m²; none of a box.
+             */
+            ocean_area_m2?: number;
+            /**
+             * Format: double
+             * @description Area of the region in it on the grid, m²: 0 of a band that polygons do not touch; none of a box.
+             */
+            region_area_m2?: number;
         };
         /** @description A step. */
         HovmollerRow: {
-            /** @description Share of each band's area that holds data, percent. */
+            /** @description Share of each band, and of the row's time, that holds data, percent: of what `coverage_basis` says. */
             coverage_percent: number[];
             /** @description First instant after it. */
             end: components["schemas"]["TimeMs"];
-            /** @description Mean of each band over its cells with data, by area; none without any. */
+            /** @description Mean of each band over its cells with data, by area; none without any, or where too little is covered. */
             means: (number | null)[];
             /** @description First instant that it covers. */
             start: components["schemas"]["TimeMs"];
             /**
-             * @description Standard deviation of each band's values about its mean, by area and time, in the unit of the values; of the whole period
-             *     (`total`) alone.
+             * @description Standard deviation of each band's values about its mean, by area and time, in the unit of the values: √(Σ w (x - m)² / Σ w), of
+             *     the values as they are, as the statistic `std`. Of the whole period (`total`) alone.
              */
             stds?: (number | null)[];
         };
@@ -1767,7 +1816,7 @@ export interface components {
             mean: number;
             /**
              * Format: double
-             * @description Standard deviation of what they leave.
+             * @description Standard deviation of what they leave, of a sample: √(Σ x² / (n - 1)).
              */
             residual_spread: number;
             /** @description The half-year. */
@@ -3748,6 +3797,11 @@ export interface operations {
                 step?: components["schemas"]["TimeStep"];
                 /** @description `true`: the mean of each calendar month is taken off both first. */
                 deseasonalise?: boolean;
+                /**
+                 * @description Least coverage, percent: steps of either that hold data over less of the region's sea, or of the line, are left out, and the answer
+                 *     says how many; 0 unless told otherwise.
+                 */
+                min_coverage?: number;
                 /** @description Longitude of a cell, degrees east, -180 to 360; with `lat`, in place of a region. */
                 lon?: number;
                 /** @description Latitude of a cell, degrees north. */
@@ -3862,6 +3916,11 @@ export interface operations {
                 step?: components["schemas"]["TimeStep"];
                 /** @description `true`: the mean of each calendar month is taken off both first. */
                 deseasonalise?: boolean;
+                /**
+                 * @description Least coverage, percent: steps of either that hold data over less of the region's sea, or of the line, are left out, and the answer
+                 *     says how many; 0 unless told otherwise.
+                 */
+                min_coverage?: number;
                 /** @description First instant, ISO 8601 UTC; the products' own unless one is given. */
                 from?: string;
                 /** @description First instant after the period; the products' own unless one is given. */
@@ -3997,6 +4056,11 @@ export interface operations {
                 minus_period?: string;
                 /** @description Its version; the newest unless one is given. */
                 minus_manifest?: string;
+                /**
+                 * @description Least coverage, percent: steps of either that hold data over less of the region's sea, or of the line, are left out, and the answer
+                 *     says how many; 0 unless told otherwise.
+                 */
+                min_coverage?: number;
                 /** @description Longitude of a cell, degrees east, -180 to 360; with `lat`, in place of a region. */
                 lon?: number;
                 /** @description Latitude of a cell, degrees north. */
@@ -4105,6 +4169,11 @@ export interface operations {
                 minus_period?: string;
                 /** @description Its version; the newest unless one is given. */
                 minus_manifest?: string;
+                /**
+                 * @description Least coverage, percent: steps of either that hold data over less of the region's sea, or of the line, are left out, and the answer
+                 *     says how many; 0 unless told otherwise.
+                 */
+                min_coverage?: number;
                 /** @description Figure of the earth for areas and lengths; `wgs84` unless one is given. */
                 earth?: components["schemas"]["Earth"];
             };
@@ -4224,15 +4293,21 @@ export interface operations {
             query: {
                 /** @description What bands lie along: `lat` or `lon`. */
                 along: components["schemas"]["Along"];
-                /** @description Height or width of a band, degrees; the least of 1, 2, 5, 10 that is no less than a cell unless given. */
+                /** @description Height or width of a band, degrees; no less than a cell; the least of 1, 2, 5, 10 that is so unless given. */
                 band?: number;
                 /** @description What a row covers; `month` unless told otherwise. `total` is the profile of the bands over all the period. */
                 step?: components["schemas"]["TimeStep"];
                 /**
-                 * @description `global`, a named region that is a box, or `west,south,east,north` in degrees: cells whose middles lie in it; all of
-                 *     the grid unless given.
+                 * @description `global`, a name that `/api/regions` lists, `west,south,east,north` in degrees, GeoJSON or well-known text, or `MASK:CODE`: the
+                 *     cells where a landed mask has a code, or what it means, such as `basins:5` or `basins:southern`. Of a box the cells count whose
+                 *     middles lie in it, of all else every cell by its share; all of the grid unless given.
                  */
                 region?: string;
+                /**
+                 * @description Least coverage, percent: means of bands with less are left out, and the answer says how many and what coverage is a share of; 0
+                 *     unless told otherwise.
+                 */
+                min_coverage?: number;
                 /** @description First instant, ISO 8601 UTC; the product's own unless one is given. */
                 from?: string;
                 /** @description First instant after the period; the product's own unless one is given. */
@@ -4271,6 +4346,140 @@ export interface operations {
             };
             /** @description Nothing of that name; the reason says where names are listed */
             404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description A defect of this server */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description A store of others, to which the product is attached, does not hold what it held */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description Too much to do, or a part that is needed does not answer */
+            503: {
+                headers: {
+                    /** @description Seconds after which the same request may succeed */
+                    "retry-after"?: number;
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description The answer took too long */
+            504: {
+                headers: {
+                    /** @description Seconds after which the same request may succeed */
+                    "retry-after"?: number;
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+        };
+    };
+    hovmoller_of: {
+        parameters: {
+            query: {
+                /** @description What bands lie along: `lat` or `lon`. */
+                along: components["schemas"]["Along"];
+                /** @description Height or width of a band, degrees; no less than a cell; the least of 1, 2, 5, 10 that is so unless given. */
+                band?: number;
+                /** @description What a row covers; `month` unless told otherwise. `total` is the profile of the bands over all the period. */
+                step?: components["schemas"]["TimeStep"];
+                /**
+                 * @description Least coverage, percent: means of bands with less are left out, and the answer says how many and what coverage is a share of; 0
+                 *     unless told otherwise.
+                 */
+                min_coverage?: number;
+                /** @description First instant, ISO 8601 UTC; the product's own unless one is given. */
+                from?: string;
+                /** @description First instant after the period; the product's own unless one is given. */
+                to?: string;
+                /** @description Figure of the earth for areas; `wgs84` unless one is given. */
+                earth?: components["schemas"]["Earth"];
+                /** @description Version, as answers name it, with or without its digest; the newest unless one is given. */
+                manifest?: string;
+            };
+            header?: never;
+            path: {
+                /** @description Name of the product */
+                product: string;
+            };
+            cookie?: never;
+        };
+        /** @description The region in place of the parameter of that name, as GeoJSON of at most 64 MiB and a million vertices */
+        requestBody: {
+            content: {
+                "application/geo+json": components["schemas"]["GeoJson"];
+                "application/json": components["schemas"]["GeoJson"];
+            };
+        };
+        responses: {
+            /** @description One row for each step, one mean in it for each band */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Hovmoller"];
+                };
+            };
+            /** @description A parameter is not valid, or missing; the reason says what would be */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description Nothing of that name; the reason says where names are listed */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description The answer is still the one whose tag `If-None-Match` names */
+            412: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description The body is longer than 64 MiB */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description The body is not said to be GeoJSON, or is compressed */
+            415: {
                 headers: {
                     [name: string]: unknown;
                 };
