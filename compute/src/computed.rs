@@ -336,8 +336,8 @@ fn check(job: &Job) -> Result<(), ComputeError> {
             let (unit, wanted) = (expression.unit(), job.quantity.unit());
             if Scaled::kept(wanted).map(|scaled| scaled.unit) != Some(unit) {
                 return refused(format!(
-                    "the expression comes to {unit}, but {:?} is stored in {wanted}",
-                    job.quantity
+                    "the expression comes to {unit}, but {} is stored in {wanted}",
+                    job.quantity.word()
                 ));
             }
             let shape = |grid: &Grid| (grid.rows, grid.cols);
@@ -385,8 +385,8 @@ fn fits_what_is_there(latest: &Manifest, job: &Job) -> Result<(), ComputeError> 
     }
     if latest.quantity.unit() != job.quantity.unit() {
         return refused(format!(
-            "{product} is there and holds {:?}; give another name",
-            latest.quantity
+            "{product} is there and holds {}; give another name",
+            latest.quantity.word()
         ));
     }
     Ok(())

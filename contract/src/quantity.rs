@@ -273,6 +273,7 @@ impl Quantity {
             title: title.to_owned(),
             range: None,
             flags: vec![],
+            is_standard_name: false,
         };
         OpenQuantity::new(words).map(Self::Open)
     }

@@ -47,8 +47,8 @@ pub fn variable(quantity: Quantity) -> String {
 /// Standard name, if the conventions' table (version 93) has one that says what the values are and no more.
 ///
 /// It has none for the upward flux of CO2 as mass of carbon, nor for what that adds up to; under partial pressure lies
-/// fugacity too, of products that landed before the two were told apart. Of an open quantity it is not known whether its
-/// name is one of the table.
+/// fugacity too, of products that landed before the two were told apart. That of an open quantity is its name, where its files
+/// state it as such, and of values as they are or means of them: of others it would need a word in `cell_methods`.
 fn standard_name(description: &Description) -> Option<&'static str> {
     match description.quantity {
         Quantity::Current if description.product.northward().is_some() => {
@@ -57,11 +57,14 @@ fn standard_name(description: &Description) -> Option<&'static str> {
         Quantity::Current if description.product.eastward().is_some() => {
             Some("northward_sea_water_velocity")
         }
-        Quantity::CarbonFlux
-        | Quantity::AccumulatedCarbon
-        | Quantity::Pco2
-        | Quantity::Current
-        | Quantity::Open(_) => None,
+        Quantity::CarbonFlux | Quantity::AccumulatedCarbon | Quantity::Pco2 | Quantity::Current => {
+            None
+        }
+        Quantity::Open(open) => {
+            let is_of_values = matches!(description.statistic, None | Some(MapStatistic::Mean));
+            let words = open.words();
+            (is_of_values && words.is_standard_name).then_some(words.name.as_str())
+        }
         Quantity::Fco2 => Some("fugacity_of_carbon_dioxide_in_sea_water"),
         Quantity::SeaSurfaceSkinTemperature => Some("sea_surface_skin_temperature"),
         Quantity::SeaSurfaceSubskinTemperature => Some("sea_surface_subskin_temperature"),
@@ -291,6 +294,7 @@ pub fn of_crs() -> Map<String, Value> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use contract::quantity::{OpenQuantity, OpenWords};
     use std::collections::BTreeSet;
 
     #[test]
@@ -308,6 +312,33 @@ mod tests {
         let count = |words| with_time.iter().filter(|it| **it == Some(words)).count();
         assert_eq!(count("area: mean"), 3);
         assert_eq!(count("area: mean time: sum"), 1);
+    }
+
+    #[test]
+    fn the_standard_name_of_an_open_quantity_is_that_of_its_files() {
+        let plain = Quantity::open("ocean_mixed_layer_thickness", "m", "Mixed layer").unwrap();
+        let Quantity::Open(open) = plain else {
+            panic!("{plain:?} is built in")
+        };
+        let named = OpenQuantity::new(OpenWords {
+            is_standard_name: true,
+            ..open.words().clone()
+        });
+        let named = Quantity::Open(named.unwrap());
+        let of = |quantity, statistic| {
+            let values = of_values(&Description {
+                quantity,
+                statistic,
+                ..crate::description::tests::description()
+            });
+            values.get("standard_name").cloned()
+        };
+        let name = Some(json!("ocean_mixed_layer_thickness"));
+        for statistic in [None, Some(MapStatistic::Mean)] {
+            assert_eq!(of(named, statistic), name);
+            assert_eq!(of(plain, statistic), None);
+        }
+        assert_eq!(of(named, Some(MapStatistic::Max)), None);
     }
 
     /// A map of highest values is none of means, whatever its quantity.

@@ -17,7 +17,7 @@ use crate::parts::{Parts, Track};
 use crate::plan::Plan;
 use crate::staged::AllStaged;
 use crate::state::State;
-use crate::{CubeError, Description, Repository, Step, arrays, axis, group, plain};
+use crate::{CubeError, Description, Repository, Step, arrays, axis, cf, group, plain};
 
 /// Where a chunk comes to lie in an array, and what it refers to; none where no cell has data.
 type Placed = (Path, ChunkIndices, Option<ChunkPayload>);
@@ -59,7 +59,7 @@ impl Layer<'_> {
         if plan.steps.len() < before {
             self.cut_off().await?;
         }
-        if plan.steps.len() != before || self.tells_codes_anew() {
+        if plan.steps.len() != before || self.tells_values_anew() {
             plain::write_length(&arrays, description, plan.steps.len()).await?;
         }
         let none = Levels::default();
@@ -106,10 +106,15 @@ impl Layer<'_> {
         }
     }
 
-    /// Are codes said to mean something else than in the state that is there?
-    fn tells_codes_anew(&self) -> bool {
+    /// Is something else said of values than in the state that is there: of what codes mean, or by which name others know them?
+    fn tells_values_anew(&self) -> bool {
+        let said = |description: &Description| {
+            let attributes = cf::of_values(description);
+            let name = attributes.get("standard_name").cloned();
+            (description.quantity.flags(), name)
+        };
         let before = self.state.description.as_ref();
-        before.is_some_and(|before| before.quantity.flags() != self.description.quantity.flags())
+        before.is_some_and(|before| said(before) != said(self.description))
     }
 
     /// Removes all that is there: cells of another grid or quantity have no place in what comes.

@@ -1,13 +1,15 @@
 //! [`Plan`] in, the bands of each step out: values of some rows on the stored grid, in the stored unit. What the reader gives is
 //! turned by whoever works on it, while the reader goes on.
 
+mod whole_numbers;
+
 use std::ops::Range;
 use std::sync::Arc;
 
 use contract::masked::MaskedCells;
 use contract::quantity::Quantity;
 
-use crate::error::Stop;
+use crate::error::{Rejection, Stop};
 use crate::inspect::file::description::Part;
 use crate::inspect::values::Values;
 use crate::plan::cf::axis::Mapping;
@@ -15,6 +17,7 @@ use crate::plan::cf::coordinate::{Axis, Role};
 use crate::plan::cf::packing::{Packing, Unpacked};
 use crate::plan::cf::unmarked::Ends;
 use crate::plan::{Plan, PlannedStep};
+use whole_numbers::WholeNumbers;
 
 /// Some rows of one step as values, `[row, col]`, from the north, stored unit, NaN for no data.
 #[derive(Debug, Clone, PartialEq)]
@@ -52,7 +55,10 @@ pub(crate) async fn run(
     rows: Range<u32>,
 ) -> Result<DecodedBand, Stop> {
     let raw = read(plan, (step, rows), None).await?;
-    Ok(Conversion::of(plan).band(raw))
+    let conversion = Conversion::of(plan);
+    let band = conversion.band(raw)?;
+    conversion.tell(plan);
+    Ok(band)
 }
 
 /// Reads some rows of one step; what the reader is to give after them it is told before it is waited for.
@@ -88,6 +94,8 @@ struct Converted {
     packing: Packing,
     /// May one of the stored numbers mean no data though nothing says so?
     has_ends: bool,
+    /// Where they may have more digits than values have.
+    whole: Option<WholeNumbers>,
 }
 
 impl Conversion {
@@ -98,16 +106,29 @@ impl Conversion {
             mapping: plan.mapping.clone(),
             packing: plan.packing.clone(),
             has_ends: is_open && plan.recipe.profile.is_none(),
+            whole: WholeNumbers::of(plan),
         }))
     }
 
+    /// Notes with a plan what was found in the bands that were turned so far.
+    pub(crate) fn tell(&self, plan: &mut Plan) {
+        let said = self.0.whole.as_ref().and_then(WholeNumbers::said);
+        if let Some(line) = said.filter(|line| !plan.assumptions.contains(line)) {
+            plan.assumptions.push(line);
+        }
+    }
+
     /// Turns rows of one step.
-    pub(crate) fn band(&self, raw: RawBand) -> DecodedBand {
+    ///
+    /// # Errors
+    /// A code that values cannot hold.
+    pub(crate) fn band(&self, raw: RawBand) -> Result<DecodedBand, Rejection> {
         let Converted {
             axes,
             mapping,
             packing,
             has_ends,
+            whole,
         } = &*self.0;
         let RawBand {
             step,
@@ -127,13 +148,17 @@ impl Conversion {
             let valued = stored.iter().filter(|stored| is_value(**stored));
             valued.for_each(|stored| ends.add(*stored));
         }
+        if let Some(whole) = whole {
+            let valued = stored.iter().map(|stored| packing.unpacked(*stored));
+            whole.check(valued, step.period)?;
+        }
         let lies = (axes.as_slice(), mapping);
         let values = converted(lies, packing, (step, rows), &stored, &mut masked);
-        DecodedBand {
+        Ok(DecodedBand {
             values,
             masked,
             ends,
-        }
+        })
     }
 }
 

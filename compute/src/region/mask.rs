@@ -405,6 +405,7 @@ mod tests {
             title: "Basin".to_owned(),
             range: None,
             flags: vec![flag(12, "west"), flag(3, "nowhere")],
+            is_standard_name: false,
         };
         let mask = Manifest {
             quantity: Quantity::Open(OpenQuantity::new(words).unwrap()),

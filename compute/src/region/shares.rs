@@ -54,7 +54,8 @@ impl Shares {
             Quantity::SeaAreaFraction => Of::Sea,
             other => {
                 return refused(format!(
-                    "it holds {other:?}; land a mask whose standard_name is land_area_fraction or sea_area_fraction"
+                    "it holds {}; land a mask whose standard_name is land_area_fraction or sea_area_fraction",
+                    other.word()
                 ));
             }
         };

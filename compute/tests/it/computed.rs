@@ -280,7 +280,7 @@ async fn what_makes_no_sense_is_refused_before_anything_is_stored() {
             asked("wind + sst", &["wind", "sst"]),
             "one is in m s-1, the other in K",
         ),
-        (asked("wind * wind", &["wind"]), "comes to m2 s-2"),
+        (asked("wind * wind", &["wind"]), "m2 s-2, but wind_speed is"),
         (
             asked("wind + coarse", &["wind", "coarse"]),
             "fluxglobe derive regrid --product coarse --like wind",

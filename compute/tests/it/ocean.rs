@@ -186,6 +186,11 @@ async fn what_cannot_say_what_is_sea_is_refused_with_both_named() {
     let ice = mask(&store, "ice", Quantity::IceFraction, GRID).await;
     let said = refused(&ice, "global").await;
     assert!(said.contains("sea_area_fraction"), "{said}");
+    // What it holds is told by its name.
+    let basins = Quantity::open("basin_code", "1", "Basins").unwrap();
+    let basins = mask(&store, "basins", basins, GRID).await;
+    let said = refused(&basins, "global").await;
+    assert!(said.contains("it holds basin_code; land"), "{said}");
 
     let values = vec![0.5; GRID.cell_count()];
     let steps = [1, 2].map(|m| (Period::month(2000, m).unwrap(), values.clone()));

@@ -702,6 +702,7 @@ async fn cells_of_a_mask_are_a_region_of_each_function() {
         title: "Basin".to_owned(),
         range: None,
         flags: vec![flag(3, "filled"), flag(1, "rest")],
+        is_standard_name: false,
     };
     let basin = Quantity::Open(OpenQuantity::new(words).unwrap());
     let year = [(Period::year(2000).unwrap(), codes)];

@@ -46,6 +46,10 @@ pub struct OpenWords {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schema(required = false)]
     pub flags: Vec<Flag>,
+    /// Is the name the CF standard name that a file states, so that other programs may be told it as such?
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    #[schema(required = false)]
+    pub is_standard_name: bool,
 }
 
 struct Known {
@@ -144,7 +148,8 @@ impl OpenQuantity {
 }
 
 impl OpenQuantity {
-    /// The same over the range of another one of its kind too; its codes mean what the other one says, if that says it.
+    /// The same over the range of another one of its kind too; its codes mean what the other one says, if that says it, and the name is a
+    /// standard name if it is one for either.
     ///
     /// # Errors
     /// Too many quantities.
@@ -159,6 +164,7 @@ impl OpenQuantity {
         Self::new(OpenWords {
             range: ranges.reduce(|[l, h], [low, high]| [l.min(low), h.max(high)]),
             flags: flags.clone(),
+            is_standard_name: own.is_standard_name || other.is_standard_name,
             ..own.clone()
         })
     }
@@ -193,6 +199,7 @@ fn validate(words: &OpenWords) -> Result<(), ContractError> {
         title,
         range,
         flags,
+        is_standard_name: _,
     } = words;
     let is_name = name.starts_with(|c: char| c.is_ascii_lowercase())
         && name
@@ -276,7 +283,30 @@ mod tests {
             title: "Title".to_owned(),
             range,
             flags: vec![],
+            is_standard_name: false,
         }
+    }
+
+    /// What was stored before names were told apart stays as it is to the byte.
+    #[test]
+    fn a_standard_name_is_told_of_where_it_is_one() {
+        let plain = OpenQuantity::new(words("alkalinity", "mol m-3", None)).unwrap();
+        let json = serde_json::to_string(plain.words()).unwrap();
+        let before = r#"{"name":"alkalinity","unit":"mol m-3","title":"Title"}"#;
+        assert_eq!(json, before);
+        let named = OpenQuantity::new(OpenWords {
+            is_standard_name: true,
+            ..plain.words().clone()
+        });
+        let named = named.unwrap();
+        let json = serde_json::to_string(named.words()).unwrap();
+        assert_eq!(json, before.replace('}', r#","is_standard_name":true}"#));
+        let again: OpenWords = serde_json::from_str(&json).unwrap();
+        assert_eq!(OpenQuantity::new(again).unwrap(), named);
+        assert!(named != plain && named.is_same_kind(plain));
+        assert_eq!(plain.joined(named).unwrap(), named);
+        assert_eq!(named.joined(plain).unwrap(), named);
+        assert!(named.over(0.0, 1.0).unwrap().words().is_standard_name);
     }
 
     #[test]

@@ -154,8 +154,9 @@ async fn computed(settings: &Settings, kafka: &KafkaSettings, request: &Request)
     let (masked, _) = manifest.masked();
     if masked.implausible > 0 {
         progress::say(&format!(
-            "{} values are no numbers, or none that {:?} can have, and were masked",
-            masked.implausible, manifest.quantity
+            "{} values are no numbers, or none that {} can have, and were masked",
+            masked.implausible,
+            manifest.quantity.word()
         ));
     }
     for (name, count) in &outcome.outside {

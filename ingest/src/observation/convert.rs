@@ -95,7 +95,7 @@ fn to_known(property: &Property, spelling: &str) -> Result<(String, f64, f64), S
     }
     // Practical salinity is a plain number that files give a great many units.
     if property.name.ends_with("salinity") {
-        return if is_salinity(spelling) {
+        return if spelling.trim().is_empty() || unit::is_salinity(spelling) {
             Ok((stored, 1.0, 0.0))
         } else {
             Err(format!(
@@ -167,28 +167,6 @@ fn is_degree(spelling: &str) -> bool {
     let lower = spelling.to_ascii_lowercase();
     let word = lower.trim_start_matches("decimal").trim();
     word.starts_with("deg") && !word.contains('c') && !word.ends_with('k') || word == "°"
-}
-
-fn is_salinity(spelling: &str) -> bool {
-    let lower = spelling.trim().to_ascii_lowercase();
-    matches!(
-        lower.as_str(),
-        "" | "1"
-            | "psu"
-            | "pss"
-            | "pss-78"
-            | "pss78"
-            | "1e-3"
-            | "0.001"
-            | "1.e-3"
-            | "g kg-1"
-            | "g/kg"
-            | "ppt"
-            | "‰"
-            | "dimensionless"
-            | "unitless"
-            | "1e-03"
-    )
 }
 
 #[cfg(test)]

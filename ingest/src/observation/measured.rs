@@ -175,6 +175,12 @@ async fn place(
 fn time_unit(file: &Description, name: &str) -> Result<TimeUnit, String> {
     let attributes = &file.variable(name).ok_or("is not in the file")?.attributes;
     let calendar = Calendar::parse(attributes.text("calendar"))?;
+    if !calendar.is_real() {
+        return Err(format!(
+            "is in the calendar {}, in which nothing was measured; give times of the real calendar",
+            calendar.name()
+        ));
+    }
     TimeUnit::parse(attributes.text("units").ok_or("has no units")?, calendar)
 }
 

@@ -61,6 +61,7 @@ impl Pipeline<'_> {
             range,
             valued,
         } = grids.all(&mut plan, at_once).await?;
+        grids.conversion.tell(&mut plan);
         raw.check_unchanged()?;
         if steps.is_empty() {
             return Err(without_values(&plan, masked).into());
@@ -250,7 +251,14 @@ struct Work {
 impl Work {
     fn band(mut self, band: RawBand) -> Result<Self, Stop> {
         let running = self.metrics.start("check");
-        let band = self.conversion.band(band);
+        let band = match self.conversion.band(band) {
+            Ok(band) => band,
+            Err(refused) => {
+                let refused = Err(refused.into());
+                running.done(ended(&refused));
+                return refused;
+            }
+        };
         let cols = (self.grid.cols as usize).max(1);
         let rows = (band.values.len() / cols) as u32;
         let empty_rows = self.rows_done;

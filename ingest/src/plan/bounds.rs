@@ -1,6 +1,6 @@
 //! Periods from the bounds of a time axis: two numbers a step, of one stretch of time or of a climatology (CF 7.1, 7.4).
 
-use contract::time::{Period, TimeMs};
+use contract::time::Period;
 
 use super::refused::refused;
 use super::{Planning, stamps};
@@ -42,18 +42,16 @@ pub(super) async fn read(
         ));
         return Ok(Bounds::Silent);
     };
-    let instants: Vec<[TimeMs; 2]> = dates
-        .iter()
-        .map(|pair| instants(&name, pair))
-        .collect::<Result<_, _>>()?;
-    if instants.iter().all(|[start, end]| start == end) {
+    let is_instant = |[start, end]: &[CalendarDate; 2]| start.count_ms() == end.count_ms();
+    if dates.iter().all(is_instant) {
         return Ok(Bounds::Instants);
     }
-    let mut periods = Vec::with_capacity(instants.len());
-    for ([start, end], stamp) in instants.into_iter().zip(stamps) {
-        let period = Period::new(start, end).map_err(|e| refused(&name, e.to_string()))?;
-        let stamp = period::instant(*stamp).map_err(|e| refused(time, e))?;
-        if stamp < start || stamp > end {
+    let mut periods = Vec::with_capacity(dates.len());
+    for ([start, end], stamp) in dates.into_iter().zip(stamps) {
+        let period = period::between(start, end).map_err(|e| refused(&name, e))?;
+        // On the count of their own calendar, for a stamp may be a day that the real one lacks.
+        let is_within = start.count_ms() <= stamp.count_ms() && stamp.count_ms() <= end.count_ms();
+        if !is_within {
             let detail = format!(
                 "has a stamp at {stamp} whose bounds in {name:?} are {period}; say in a profile where the time comes from"
             );
@@ -62,11 +60,6 @@ pub(super) async fn read(
         periods.push(period);
     }
     Ok(Bounds::Periods(periods))
-}
-
-fn instants(name: &str, pair: &[CalendarDate; 2]) -> Result<[TimeMs; 2], Rejection> {
-    let at = |date| period::instant(date).map_err(|e| refused(name, e));
-    Ok([at(pair[0])?, at(pair[1])?])
 }
 
 /// Both dates of every step; none if no variable of that shape holds them.

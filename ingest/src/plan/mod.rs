@@ -9,6 +9,7 @@ mod date;
 mod edges;
 mod flags;
 mod method;
+mod model_calendar;
 mod place;
 pub(crate) mod profile;
 mod quality;

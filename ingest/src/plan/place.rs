@@ -267,12 +267,19 @@ async fn read_mapping(
         (lat_deg, lon_deg)
     };
     let registration = registration(planning, rules, &names, [&lat_deg, &lon_deg]);
-    Ok(Mapping::from_labels(
-        &lat_deg,
-        &lon_deg,
-        registration,
-        [&names[0], &names[1]],
-    )?)
+    let mapping = Mapping::from_labels(&lat_deg, &lon_deg, registration, [&names[0], &names[1]])?;
+    for (name, role, labels) in [
+        (&names[0], Role::Latitude, &lat_deg),
+        (&names[1], Role::Longitude, &lon_deg),
+    ] {
+        if let Some((off_deg, cells)) = mapping.moved(role, labels, registration) {
+            planning.assume(format!(
+                "{name}: is not evenly spaced; its cells are taken for evenly spaced ones, the farthest {off_deg:.5} degrees ({:.1} % of a cell) from its label",
+                100.0 * cells
+            ));
+        }
+    }
+    Ok(mapping)
 }
 
 /// What labels name: what a profile says, else centres, unless they can only be corners.

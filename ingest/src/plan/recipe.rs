@@ -12,7 +12,9 @@ use crate::plan::profile::Profile;
 /// 2: masked cells are counted, valid ranges are read as CF says.
 /// 3: fugacity is told from partial pressure, and temperatures of the sea surface by their depth.
 /// 4: cells lie where the bounds of axes say, and extremes and spreads over time are not taken for the quantity.
-pub(crate) const DECODER: u32 = 4;
+/// 5: steps of calendars of models are counted in these, codes that values cannot hold are refused, salinity is read in the units that
+///    the conventions have for it, and notes tell of all this and of labels that are not evenly spaced.
+pub(crate) const DECODER: u32 = 5;
 
 /// How a file was read.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]

@@ -21,9 +21,18 @@ pub(super) fn unit(
     let variable = planning.file.variable(name).ok_or_else(missing)?;
     let unit = unit.or_else(|| variable.attributes.text("units"));
     let unit = unit.ok_or_else(|| refused(name, "has no units; state them in a profile"))?;
-    let calendar = calendar.or_else(|| variable.attributes.text("calendar"));
-    let calendar = Calendar::parse(calendar).map_err(|e| refused(name, e))?;
+    let calendar = self::calendar(planning, name, calendar)?;
     TimeUnit::parse(unit, calendar).map_err(|e| refused(name, e))
+}
+
+/// The calendar of a time variable; `stated` instead of that of the file.
+pub(super) fn calendar(
+    planning: &Planning<'_>,
+    name: &str,
+    stated: Option<&str>,
+) -> Result<Calendar, Rejection> {
+    let of_file = || planning.file.variable(name)?.attributes.text("calendar");
+    Calendar::parse(stated.or_else(of_file)).map_err(|e| refused(name, e))
 }
 
 /// All stamps of a time variable.

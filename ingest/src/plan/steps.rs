@@ -1,15 +1,17 @@
 //! When the steps of a variable are, and how the values of each become the stored unit.
 
+use std::cmp::Ordering;
+
 use contract::event::RejectReason;
 use contract::quantity::Quantity;
 use contract::time::Period;
 
 use super::bounds::{self, Bounds};
 use super::refused::refused;
-use super::{PlannedStep, Planning, coverage, date, stamps};
+use super::{PlannedStep, Planning, coverage, date, model_calendar, stamps};
 use crate::error::{Rejection, Stop};
 use crate::inspect::file::description::Variable;
-use crate::plan::cf::calendar::CalendarDate;
+use crate::plan::cf::calendar::{Calendar, CalendarDate};
 use crate::plan::cf::cell_methods::{self, TimeMethod};
 use crate::plan::cf::coordinate::{Axis, Role};
 use crate::plan::cf::open;
@@ -51,6 +53,9 @@ pub(super) async fn periods(
         );
         return Err(refused("time", detail).into());
     }
+    if let Some((name, calendar)) = calendar(planning, axes)? {
+        model_calendar::check(planning, &name, calendar, &periods)?;
+    }
     let mut sorted = periods.clone();
     sorted.sort();
     let overlapping = sorted.windows(2).find(|pair| pair[0].overlaps(pair[1]));
@@ -61,6 +66,27 @@ pub(super) async fn periods(
         return Err(refused("time", detail).into());
     }
     Ok(periods)
+}
+
+/// The time variable that the steps are counted by, and its calendar.
+fn calendar(
+    planning: &Planning<'_>,
+    axes: &[Axis],
+) -> Result<Option<(String, Calendar)>, Rejection> {
+    let (name, stated) = match planning.profile.and_then(|p| p.time.as_ref()) {
+        None => (planning.time_variable(axes), None),
+        Some(rules) => match &rules.from {
+            TimeSource::Variable { name, calendar, .. } => {
+                (Some(name.clone()), calendar.as_deref())
+            }
+            _ => (None, None),
+        },
+    };
+    let Some(name) = name else {
+        return Ok(None);
+    };
+    let calendar = stamps::calendar(planning, &name, stated)?;
+    Ok(Some((name, calendar)))
 }
 
 async fn by_rules(
@@ -140,14 +166,48 @@ async fn by_file(
             fixed(planning, variable, Some(stamp), is_fixed, silent)
         })?]);
     }
-    if method == Some(TimeMethod::Point) {
-        let periods = spacing::around(&stamps).map_err(|e| refused(&name, e))?;
+    let (stamps, is_backwards) = rising(&name, stamps)?;
+    let mut periods = if method == Some(TimeMethod::Point) {
         planning.assume(format!(
             "{name}: has values at instants; each stands for the time half way to its neighbours"
         ));
-        return Ok(periods);
+        spacing::around(&stamps).map_err(|e| refused(&name, e))?
+    } else {
+        by_spacing(planning, &name, &stamps)?
+    };
+    if is_backwards {
+        periods.reverse();
     }
-    Ok(by_spacing(planning, &name, &stamps)?)
+    Ok(periods)
+}
+
+/// Stamps in the order of time, and whether the file has them the other way round.
+fn rising(
+    name: &str,
+    mut stamps: Vec<CalendarDate>,
+) -> Result<(Vec<CalendarDate>, bool), Rejection> {
+    let place = |stamp: Option<&CalendarDate>| stamp.and_then(|stamp| stamp.count_ms());
+    let is_backwards = place(stamps.first()) > place(stamps.last());
+    for (index, pair) in stamps.windows(2).enumerate() {
+        let (before, after) = (place(pair.first()), place(pair.last()));
+        let (first, second) = (index + 1, index + 2);
+        let detail = match before.cmp(&after) {
+            Ordering::Equal => format!(
+                "has the time {} twice, of the steps {first} and {second} of the file; leave one out, or say in a profile where the time comes from",
+                pair[0]
+            ),
+            order if (order == Ordering::Greater) != is_backwards => format!(
+                "goes neither up nor down: step {second} of the file is of {}, after {}; sort the file by time",
+                pair[1], pair[0]
+            ),
+            _ => continue,
+        };
+        return Err(refused(name, detail));
+    }
+    if is_backwards {
+        stamps.reverse();
+    }
+    Ok((stamps, is_backwards))
 }
 
 /// The one step of what holds at any time, of which nothing says when it is: the year of its stamp, if it has one.
@@ -249,7 +309,7 @@ pub(super) fn convert(
     }
     let spelling = stated.or(own).ok_or_else(missing)?;
     let wrong = |e: String| bad(format!("has unit {spelling:?}, which {e}"));
-    let unit = unit::parse(spelling).map_err(wrong)?;
+    let unit = unit::of(meaning.quantity, spelling).map_err(wrong)?;
     let conversion = unit
         .to_quantity(meaning.quantity, meaning.substance)
         .map_err(wrong)?;

@@ -292,6 +292,32 @@ async fn labels_at_corners_with_bounds_land_where_these_say() {
     );
 }
 
+/// A Gaussian grid is evened out, by how much is told, and what is farther from even is refused.
+#[tokio::test]
+async fn latitudes_that_are_not_quite_even_are_told_of() {
+    let gaussian = [
+        73.7992, 52.8129, 31.7041, 10.5699, -10.5699, -31.7041, -52.8129, -73.7992,
+    ];
+    let file = |lat: &[f64]| {
+        let mut file = MadeFile::sst(2).numbers("lat", lat);
+        file.dimensions[1].1 = lat.len();
+        file.but("sst", |v| Made {
+            values: Values::Floats(vec![20.0; 2 * 8 * lat.len()]),
+            ..v
+        })
+    };
+    let outcome = land(&file(&gaussian)).await;
+    let about = |line: &&String| line.starts_with("lat: is not evenly spaced");
+    let told: Vec<String> = assumed(&outcome).iter().filter(about).cloned().collect();
+    assert!(
+        told.len() == 1 && told[0].contains("0.10") && told[0].contains("(0.5 % of a cell)"),
+        "{outcome}"
+    );
+    let mut uneven = gaussian;
+    uneven[3] += 1.0;
+    assert_refused(&file(&uneven), &["lat: ", "not evenly spaced", "regrid"]).await;
+}
+
 /// Plain HDF5 names no dimensions.
 #[tokio::test]
 async fn axes_without_names_are_told_by_length_or_refused() {

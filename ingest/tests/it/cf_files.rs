@@ -243,3 +243,24 @@ async fn shares_of_land_and_sea_land_as_shares_of_one_whatever_their_unit() {
         }
     }
 }
+
+/// As the conventions' table has its unit, and as people write it.
+#[tokio::test]
+async fn salinity_in_thousandths_is_the_number_that_it_is() {
+    for unit in ["1e-3", "0.001", "psu"] {
+        let salt = Made::new(
+            "so",
+            &["time", "lat", "lon"],
+            Values::Floats(vec![35.25; 64]),
+        );
+        let salt = salt.text("standard_name", "sea_water_salinity");
+        let place = Place::new();
+        let file = MadeFile::days(2).with(salt.text("units", unit));
+        file.write(&place.path("a.nc"));
+        let outcome = place.land(&[place.path("a.nc")]).await.remove(0);
+        assert!(!outcome.is_rejected(), "{unit}: {outcome}");
+        let manifest = place.newest("so").await;
+        assert_eq!(manifest.quantity, Quantity::Salinity);
+        assert_eq!(place.values(&manifest, 0).await[7], 35.25, "{unit}");
+    }
+}

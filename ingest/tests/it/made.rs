@@ -19,6 +19,7 @@ pub(crate) enum Says {
 pub(crate) enum Values {
     Bytes(Vec<i8>),
     Shorts(Vec<i16>),
+    Ints(Vec<i32>),
     Floats(Vec<f32>),
     Doubles(Vec<f64>),
 }
@@ -139,6 +140,7 @@ impl MadeFile {
             match values {
                 Values::Bytes(values) => writer.write_var_i8(name, values),
                 Values::Shorts(values) => writer.write_var_i16(name, values),
+                Values::Ints(values) => writer.write_var_i32(name, values),
                 Values::Floats(values) => writer.write_var_f32(name, values),
                 Values::Doubles(values) => writer.write_var_f64(name, values),
             }
@@ -158,6 +160,7 @@ fn define(set: &mut DataSet, variable: &Made) {
     match values {
         Values::Bytes(_) => set.add_var_i8(name, dimensions),
         Values::Shorts(_) => set.add_var_i16(name, dimensions),
+        Values::Ints(_) => set.add_var_i32(name, dimensions),
         Values::Floats(_) => set.add_var_f32(name, dimensions),
         Values::Doubles(_) => set.add_var_f64(name, dimensions),
     }

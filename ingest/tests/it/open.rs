@@ -64,6 +64,7 @@ async fn a_variable_of_another_kind_lands_under_its_own_words() {
         )
     );
     assert_eq!(words.range, Some([0.0, 0.063]), "of both steps");
+    assert!(words.is_standard_name);
     let second = place.values(&manifest, 1).await;
     assert_eq!(second[5].to_bits(), (37.0f64 * 1e-3).to_bits_as_f32());
 }
@@ -288,6 +289,39 @@ fn basins() -> Made {
 fn told(mask: Made) -> Made {
     mask.says("flag_values", Says::Bytes(&[0, 1, 2]))
         .text("flag_meanings", "none atlantic indian")
+}
+
+/// Values are float32, in which one code of two beside each other would become the other.
+#[tokio::test]
+async fn codes_that_values_cannot_hold_are_refused_and_other_numbers_are_told_of() {
+    let codes = |code| Made::new("basin", &["lat", "lon"], Values::Ints(vec![code; 32]));
+    let said = refused(&MadeFile::days(1).with(codes(16_777_217))).await;
+    assert!(
+        said.contains("basin: has the code 16777217 in 2001"),
+        "{said}"
+    );
+    let place = Place::new();
+    let outcome = land(&place, &MadeFile::days(1).with(codes(16_777_216))).await;
+    assert!(!outcome.is_rejected(), "{outcome}");
+    assert!(!outcome.to_string().contains("float32"), "{outcome}");
+    let manifest = place.newest("a").await;
+    assert_eq!(place.values(&manifest, 0).await[0], 16_777_216.0);
+
+    let depths = |depth| {
+        let values = Values::Ints(vec![depth; 64]);
+        let depths = Made::new("depth_of_shot", &["time", "lat", "lon"], values);
+        MadeFile::days(2).with(depths.text("units", "m"))
+    };
+    for (depth, is_told) in [(16_777_217, true), (16_777_218, false)] {
+        let outcome = land(&Place::new(), &depths(depth)).await;
+        assert!(!outcome.is_rejected(), "{outcome}");
+        let line = outcome.to_string();
+        assert_eq!(
+            line.contains("whole numbers beyond 16777216"),
+            is_told,
+            "{line}"
+        );
+    }
 }
 
 #[tokio::test]

@@ -385,3 +385,73 @@ async fn one_stamp_and_the_coverage_must_agree() {
         Vec::<String>::new()
     );
 }
+
+/// A temperature of as many degrees as the step is of the file.
+fn numbered(days: &[f64]) -> MadeFile {
+    let values = (0..days.len()).flat_map(|step| [step as f32; 32]).collect();
+    let numbered = |v: Made| Made {
+        values: Values::Floats(values),
+        ..v
+    };
+    MadeFile::sst(days.len())
+        .numbers("time", days)
+        .but("sst", numbered)
+}
+
+#[tokio::test]
+async fn an_axis_that_goes_backwards_is_read_as_it_is() {
+    for (file, last) in [
+        (
+            numbered(&[2.0, 1.0, 0.0]),
+            period("2001-01-03", "2001-01-04"),
+        ),
+        (
+            method(numbered(&[2.0, 1.0, 0.0]), "time: point"),
+            period("2001-01-02T12:00:00Z", "2001-01-03T12:00:00Z"),
+        ),
+    ] {
+        let place = Place::new();
+        file.write(&place.path("a.nc"));
+        let outcome = place.land(&[place.path("a.nc")]).await.remove(0);
+        assert!(!outcome.is_rejected(), "{outcome}");
+        let manifest = place.newest("sst").await;
+        assert_eq!(manifest.steps[2].period, last);
+        for (step, degrees) in [(0, 2.0f64), (1, 1.0), (2, 0.0)] {
+            let wanted = (degrees + 273.15) as f32;
+            assert_eq!(place.values(&manifest, step).await[5], wanted, "{step}");
+        }
+    }
+}
+
+#[tokio::test]
+async fn times_that_are_there_twice_or_in_no_order_are_refused_with_their_places() {
+    assert_refused(
+        &numbered(&[0.0, 1.0, 1.0, 2.0]),
+        &["time: ", "2001-01-02 twice", "steps 2 and 3"],
+    )
+    .await;
+    assert_refused(
+        &numbered(&[0.0, 2.0, 1.0, 3.0]),
+        &[
+            "time: ",
+            "neither up nor down",
+            "step 3",
+            "2001-01-02, after 2001-01-03",
+        ],
+    )
+    .await;
+}
+
+#[tokio::test]
+async fn parts_of_a_second_since_a_date_are_read() {
+    for (unit, second) in [
+        ("milliseconds since 2001-01-01", 1e3),
+        ("microseconds since 2001-01-01", 1e6),
+        ("nanoseconds since 2001-01-01", 1e9),
+    ] {
+        let file = numbered(&[0.0, 86_400.0 * second]);
+        let file = file.but("time", |v| v.text("units", unit));
+        let (periods, _) = told(&file, None).await;
+        assert_eq!(periods[1], period("2001-01-02", "2001-01-03"), "{unit}");
+    }
+}

@@ -1,7 +1,7 @@
 //! Attributes of HDF5 objects: bounded numbers and texts out; references and compounds are passed over.
 
 use hdf5::types::{FixedAscii, FixedUnicode, TypeDescriptor, VarLenAscii, VarLenUnicode};
-use hdf5::{Attribute, Location};
+use hdf5::{Attribute, Datatype, Location};
 
 use super::description::{
     AttributeValue, Attributes, Kind, MAX_ATTRIBUTE_NUMBERS, MAX_ATTRIBUTE_TEXT_BYTES,
@@ -35,10 +35,11 @@ fn read(attribute: &Attribute) -> Option<AttributeValue> {
     if count == 0 || count > MAX_ATTRIBUTE_NUMBERS {
         return None;
     }
-    match attribute.dtype().ok()?.to_descriptor().ok()? {
-        TypeDescriptor::Integer(size) => numbers(attribute, Kind::Integer(size as u8)),
-        TypeDescriptor::Unsigned(size) => numbers(attribute, Kind::Unsigned(size as u8)),
-        TypeDescriptor::Float(size) => numbers(attribute, Kind::Float(size as u8)),
+    let stored = attribute.dtype().ok()?;
+    if let Some(kind) = kind(&stored) {
+        return numbers(attribute, kind);
+    }
+    match stored.to_descriptor().ok()? {
         TypeDescriptor::FixedAscii(_) => {
             let texts = attribute
                 .read_raw::<FixedAscii<MAX_ATTRIBUTE_TEXT_BYTES>>()
@@ -62,6 +63,21 @@ fn read(attribute: &Attribute) -> Option<AttributeValue> {
             }))
         }
         _ => None,
+    }
+}
+
+/// How numbers of a type are stored; none if it is no type of numbers.
+pub(super) fn kind(stored: &Datatype) -> Option<Kind> {
+    match stored.to_descriptor() {
+        Ok(TypeDescriptor::Integer(size)) => Some(Kind::Integer(size as u8)),
+        Ok(TypeDescriptor::Unsigned(size)) => Some(Kind::Unsigned(size as u8)),
+        Ok(TypeDescriptor::Float(size)) => Some(Kind::Float(size as u8)),
+        Ok(_) => None,
+        // The library has no name for floating-point numbers of two bytes, and reads them as float64 all the same.
+        Err(_unnamed) => {
+            let is_number = stored.size() == 2 && stored.conv_to::<f64>().is_some();
+            is_number.then_some(Kind::Float(2))
+        }
     }
 }
 

@@ -9,7 +9,7 @@ use std::path::Path;
 use contract::event::RejectReason;
 use hdf5::dataset::Layout;
 use hdf5::filters::Filter;
-use hdf5::types::{TypeDescriptor, VarLenArray};
+use hdf5::types::VarLenArray;
 use hdf5::{
     Dataset, File, LinkType, ObjectReference as _, ObjectReference1, ReferencedObject, SliceOrIndex,
 };
@@ -243,13 +243,11 @@ fn describe_dataset(
     {
         return Ok(None);
     }
-    let kind = match dataset.dtype().and_then(|t| t.to_descriptor()) {
-        Ok(TypeDescriptor::Integer(size)) => Kind::Integer(size as u8),
-        Ok(TypeDescriptor::Unsigned(size)) => Kind::Unsigned(size as u8),
-        Ok(TypeDescriptor::Float(size)) => Kind::Float(size as u8),
-        Ok(other) => hdf5_text::kind(&other).unwrap_or(Kind::Other),
-        Err(_unknown) => Kind::Other,
-    };
+    let kind = dataset.dtype().ok().and_then(|stored| {
+        let text = || hdf5_text::kind(&stored.to_descriptor().ok()?);
+        hdf5_attribute::kind(&stored).or_else(text)
+    });
+    let kind = kind.unwrap_or(Kind::Other);
     let names = dimension_names(file, name, dataset, &attributes, shape.len());
     let dimensions = names
         .into_iter()

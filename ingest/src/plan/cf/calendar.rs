@@ -2,9 +2,12 @@
 //!
 //! Dates are kept as year, month, day and seconds of the day, since 30 February exists in the 360-day calendar.
 
+use std::fmt::{Display, Formatter};
+
 use chrono::{Datelike as _, NaiveDate};
 
 const DAY_S: f64 = 86_400.0;
+const DAY_MS: i64 = 86_400_000;
 /// Largest distance from the reference date, days: past year 9999 nothing is stored.
 const MAX_DAYS: f64 = 4_000_000.0;
 
@@ -16,6 +19,8 @@ pub(crate) enum Calendar {
     ProlepticGregorian,
     /// No 29 February.
     NoLeap,
+    /// A 29 February in every year.
+    AllLeap,
     /// Twelve months of 30 days.
     Days360,
 }
@@ -41,6 +46,8 @@ pub(crate) struct TimeUnit {
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum CalendarStep {
     Seconds(f64),
+    /// So many of them are a second: whole ones are divided without a rounding.
+    PartsOfSecond(f64),
     Months(i32),
 }
 
@@ -50,6 +57,7 @@ impl Calendar {
             "standard" | "gregorian" | "" => Ok(Self::Standard),
             "proleptic_gregorian" => Ok(Self::ProlepticGregorian),
             "noleap" | "365_day" => Ok(Self::NoLeap),
+            "all_leap" | "366_day" => Ok(Self::AllLeap),
             "360_day" => Ok(Self::Days360),
             other => Err(format!(
                 "calendar {other:?} is not known; give the time in a profile"
@@ -57,8 +65,33 @@ impl Calendar {
         }
     }
 
-    /// Days since an origin of the calendar's own.
-    fn day_number(self, year: i32, month: u32, day: u32) -> Option<i64> {
+    /// Is it that of the days on which things were measured, and not one of models?
+    pub(crate) fn is_real(self) -> bool {
+        matches!(self, Self::Standard | Self::ProlepticGregorian)
+    }
+
+    /// Its name in the conventions.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Standard => "standard",
+            Self::ProlepticGregorian => "proleptic_gregorian",
+            Self::NoLeap => "noleap",
+            Self::AllLeap => "all_leap",
+            Self::Days360 => "360_day",
+        }
+    }
+
+    /// Days of a year, of one without a leap day where there are both.
+    pub(crate) fn year_days(self) -> i64 {
+        match self {
+            Self::Standard | Self::ProlepticGregorian | Self::NoLeap => 365,
+            Self::AllLeap => 366,
+            Self::Days360 => 360,
+        }
+    }
+
+    /// Days since an origin of the calendar's own; none of a day that it does not have.
+    pub(crate) fn day_number(self, year: i32, month: u32, day: u32) -> Option<i64> {
         match self {
             Self::ProlepticGregorian => {
                 NaiveDate::from_ymd_opt(year, month, day).map(|d| d.num_days_from_ce().into())
@@ -70,6 +103,10 @@ impl Calendar {
             Self::NoLeap => {
                 let day_of_year = NaiveDate::from_ymd_opt(2001, month, day)?.ordinal0();
                 Some(i64::from(year) * 365 + i64::from(day_of_year))
+            }
+            Self::AllLeap => {
+                let day_of_year = NaiveDate::from_ymd_opt(2000, month, day)?.ordinal0();
+                Some(i64::from(year) * 366 + i64::from(day_of_year))
             }
             Self::Days360 => {
                 let valid = (1..=12).contains(&month) && (1..=30).contains(&day);
@@ -93,6 +130,11 @@ impl Calendar {
                 let date = NaiveDate::from_yo_opt(2001, day_number.rem_euclid(365) as u32 + 1)?;
                 (year, date.month(), date.day())
             }
+            Self::AllLeap => {
+                let year = i32::try_from(day_number.div_euclid(366)).ok()?;
+                let date = NaiveDate::from_yo_opt(2000, day_number.rem_euclid(366) as u32 + 1)?;
+                (year, date.month(), date.day())
+            }
             Self::Days360 => {
                 let (year, day) = (
                     day_number.div_euclid(360),
@@ -108,6 +150,35 @@ impl Calendar {
             second,
             calendar: self,
         })
+    }
+}
+
+impl CalendarDate {
+    /// Milliseconds on the count of its calendar, from an origin of the calendar's own; none of a day that it does not have.
+    pub(crate) fn count_ms(self) -> Option<i64> {
+        let days = self.calendar.day_number(self.year, self.month, self.day)?;
+        days.checked_mul(DAY_MS)?
+            .checked_add((self.second * 1000.0).round() as i64)
+    }
+
+    /// The date so much later on that count; none outside the years 1 to 9998.
+    pub(crate) fn later(self, ms: i64) -> Option<Self> {
+        let count_ms = self.count_ms()?.checked_add(ms)?;
+        let second = count_ms.rem_euclid(DAY_MS) as f64 / 1000.0;
+        self.calendar.date(count_ms.div_euclid(DAY_MS), second)
+    }
+}
+
+/// `2000-02-30`, and the time of day where it is no midnight.
+impl Display for CalendarDate {
+    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{:04}-{:02}-{:02}", self.year, self.month, self.day)?;
+        let second = self.second.round() as i64;
+        if second == 0 {
+            return Ok(());
+        }
+        let (hour, minute) = (second / 3600, second / 60 % 60);
+        write!(f, "T{hour:02}:{minute:02}:{:02}", second % 60)
     }
 }
 
@@ -134,7 +205,9 @@ impl TimeUnit {
         let (step, date) = lower.split_once(" since ").ok_or_else(bad)?;
         let step = match step.trim() {
             "seconds" | "second" | "sec" | "secs" | "s" => CalendarStep::Seconds(1.0),
-            "milliseconds" | "millisecond" | "msec" | "ms" => CalendarStep::Seconds(1e-3),
+            "milliseconds" | "millisecond" | "msec" | "ms" => CalendarStep::PartsOfSecond(1e3),
+            "microseconds" | "microsecond" | "microsec" | "us" => CalendarStep::PartsOfSecond(1e6),
+            "nanoseconds" | "nanosecond" | "nanosec" | "ns" => CalendarStep::PartsOfSecond(1e9),
             "minutes" | "minute" | "min" | "mins" => CalendarStep::Seconds(60.0),
             "hours" | "hour" | "hr" | "hrs" | "h" => CalendarStep::Seconds(3600.0),
             "days" | "day" | "d" => CalendarStep::Seconds(DAY_S),
@@ -161,18 +234,9 @@ impl TimeUnit {
             second,
             calendar,
         } = self.reference;
-        match self.step {
-            CalendarStep::Seconds(step_s) => {
-                let total_s = number * step_s + second;
-                let days = (total_s / DAY_S).floor();
-                if !days.is_finite() || days.abs() > MAX_DAYS {
-                    return Err(bad());
-                }
-                let start = calendar.day_number(year, month, day).ok_or_else(bad)?;
-                calendar
-                    .date(start + days as i64, total_s - days * DAY_S)
-                    .ok_or_else(bad)
-            }
+        let after_s = match self.step {
+            CalendarStep::Seconds(step_s) => number * step_s,
+            CalendarStep::PartsOfSecond(parts) => number / parts,
             // Calendar months and years, as people who write them mean it; UDUNITS would take 30.44 days.
             CalendarStep::Months(per_step) => {
                 if !(number.is_finite() && number.abs() < 120_000.0) {
@@ -183,11 +247,20 @@ impl TimeUnit {
                 let year = i32::try_from(months.div_euclid(12)).map_err(|_far| bad())?;
                 let month = months.rem_euclid(12) as u32 + 1;
                 let number = calendar.day_number(year, month, 1).ok_or_else(bad)?;
-                calendar
+                return calendar
                     .date(number + i64::from(day.min(28)) - 1, second)
-                    .ok_or_else(bad)
+                    .ok_or_else(bad);
             }
+        };
+        let total_s = after_s + second;
+        let days = (total_s / DAY_S).floor();
+        if !days.is_finite() || days.abs() > MAX_DAYS {
+            return Err(bad());
         }
+        let start = calendar.day_number(year, month, day).ok_or_else(bad)?;
+        calendar
+            .date(start + days as i64, total_s - days * DAY_S)
+            .ok_or_else(bad)
     }
 }
 
@@ -300,6 +373,44 @@ mod tests {
             date("Days since 1970-01-01T00:00:00Z", "standard", 0.25),
             "1970-01-01 21600"
         );
+    }
+
+    /// Offsets are counted in the calendar of the file, whatever is subtracted or added.
+    #[test]
+    fn calendars_of_models_count_their_own_days() {
+        for (calendar, number, expected) in [
+            ("noleap", 365.0 * 4.0, "2004-01-01 0"),
+            ("365_day", -306.0, "1999-03-01 0"),
+            ("all_leap", 366.0, "2001-01-01 0"),
+            ("366_day", 366.0 + 59.0, "2001-02-29 0"),
+            ("360_day", 360.0 + 29.0, "2001-01-30 0"),
+        ] {
+            let found = date("days since 2000-01-01", calendar, number);
+            assert_eq!(found, expected, "{calendar} {number}");
+        }
+        let calendar = Calendar::parse(Some("noleap")).unwrap();
+        let unit = TimeUnit::parse("days since 2004-02-28", calendar).unwrap();
+        let (last, first) = (unit.date(0.0).unwrap(), unit.date(1.0).unwrap());
+        assert_eq!(
+            (last.later(DAY_MS), first.later(-DAY_MS)),
+            (Some(first), Some(last))
+        );
+        assert_eq!(first.to_string(), "2004-03-01");
+        assert!(TimeUnit::parse("days since 2004-02-29", calendar).is_err());
+    }
+
+    /// Numbers of 64 bits as other programs write them, whole seconds to the bit.
+    #[test]
+    fn parts_of_a_second_are_counted() {
+        for (step, per_second) in [
+            ("milliseconds", 1e3),
+            ("microseconds", 1e6),
+            ("nanoseconds", 1e9),
+        ] {
+            let unit = format!("{step} since 1970-01-01");
+            let found = date(&unit, "standard", 978_350_401.0 * per_second);
+            assert_eq!(found, "2001-01-01 43201", "{step}");
+        }
     }
 
     #[test]

@@ -8,7 +8,7 @@ use super::coordinate::{self, Role};
 use super::projection;
 use super::quantity::{Named, of_standard_name};
 use crate::error::Rejection;
-use crate::inspect::file::description::{Description, Variable};
+use crate::inspect::file::description::{Description, Kind, Variable};
 
 /// Attributes that name other variables, which are there for the one that has them.
 const NAMES_OTHERS: [&str; 7] = [
@@ -46,6 +46,8 @@ const STATISTICS: [&str; 21] = [
 ];
 /// Attribute of every file of the Group for High Resolution Sea Surface Temperature.
 const GHRSST: &str = "gds_version_id";
+/// What is wrong with a variable of text, of parts, or of numbers for which there is no type here.
+const NO_NUMBERS: &str = "is of a type that is not read; give integers, float32 or float64";
 const ADVICE: &str = "name one with --variable, or say in a profile which one to land";
 
 /// The variable, and what is taken for granted with it.
@@ -53,14 +55,15 @@ pub(crate) type Chosen<'a> = (&'a Variable, Option<String>);
 
 /// The variable that is asked for.
 pub(crate) fn asked<'a>(file: &'a Description, name: &str) -> Result<&'a Variable, Rejection> {
-    let found = file.variable(name).filter(|v| v.is_numeric());
-    found.ok_or_else(|| {
-        let detail = format!(
+    let refused = |detail: &str| Err(Rejection::new(RejectReason::NoVariable, name, detail));
+    match file.variable(name) {
+        Some(found) if found.is_numeric() => Ok(found),
+        Some(_) => refused(NO_NUMBERS),
+        None => refused(&format!(
             "is not in the file, which holds {}",
             listed(file.variables.iter())
-        );
-        Rejection::new(RejectReason::NoVariable, name, detail)
-    })
+        )),
+    }
 }
 
 /// The variable that a file is about.
@@ -95,7 +98,10 @@ pub(crate) fn of(file: &Description) -> Result<Chosen<'_>, Rejection> {
         .collect();
     match (main.as_slice(), data.as_slice()) {
         ([only], _) => Ok((only, beside(only, &on_grid))),
-        ([], []) => refused("holds no gridded variable; give a file with one".to_owned()),
+        ([], []) => match file.variables.iter().find(|v| is_unread(v)) {
+            Some(unread) => refused(format!("holds {}, which {NO_NUMBERS}", unread.name)),
+            None => refused("holds no gridded variable; give a file with one".to_owned()),
+        },
         ([], [first, ..]) => Err(coordinate::no_grid(file, first)),
         (several, _) => refused(format!(
             "has several gridded variables ({}), and no standard_name says which it is about; {ADVICE}",
@@ -125,6 +131,11 @@ fn of_known<'a>(
         listed(all.iter().copied())
     );
     Err(Rejection::new(RejectReason::NoVariable, "file", detail))
+}
+
+/// Would it be a map, were its values of a type that is read?
+fn is_unread(variable: &Variable) -> bool {
+    variable.kind == Kind::Other && variable.dimensions.len() >= 2
 }
 
 fn named(variable: &Variable) -> Option<Named> {

@@ -59,12 +59,14 @@ pub(crate) fn quantity(variable: &Variable) -> Result<Quantity, Rejection> {
     let title =
         text("long_name").map_or_else(|| name.replace('_', " "), |long| cut(long, MAX_TITLE_BYTES));
     let words = OpenWords {
-        name,
         unit: unit::canonical(spelling)
             .map_or_else(|| cut(spelling, MAX_UNIT_BYTES), |(unit, _)| unit),
         title,
         range: None,
         flags: vec![],
+        // Of one with a modifier the name is no standard name any more, nor of what is none by its letters.
+        is_standard_name: text("standard_name") == Some(name.as_str()),
+        name,
     };
     match OpenQuantity::new(words) {
         Ok(open) => Ok(Quantity::Open(open)),
@@ -182,6 +184,23 @@ mod tests {
             three("tm", "1", "3²")
         );
         assert!(quantity(&variable("___", &[])).is_err());
+    }
+
+    #[test]
+    fn a_name_is_a_standard_name_where_the_file_says_so_in_its_letters() {
+        let is_one = |attributes: &[(&str, &str)]| {
+            let Ok(Quantity::Open(open)) = quantity(&variable("v", attributes)) else {
+                panic!("no open quantity")
+            };
+            open.words().is_standard_name
+        };
+        let named = |name| is_one(&[("standard_name", name), ("long_name", "Heat")]);
+        assert!(named("surface_downward_heat_flux_in_sea_water"));
+        assert!(!named(
+            "surface_downward_heat_flux_in_sea_water standard_error"
+        ));
+        assert!(!named("Sea-Mask") && !named(""));
+        assert!(!is_one(&[("long_name", "heat")]));
     }
 
     #[test]

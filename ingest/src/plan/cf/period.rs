@@ -8,6 +8,8 @@ use crate::inspect::file::description::Attributes;
 
 const DAY_MS: i64 = 86_400_000;
 const HOUR_MS: i64 = 3_600_000;
+/// What is wrong with a date that leads out of what can be stored.
+const TOO_FAR: &str = "leads past the years 1 to 9998";
 
 /// How long the steps of a product are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
@@ -69,9 +71,7 @@ impl Covers {
         stamp: CalendarDate,
         at: Option<StampAt>,
     ) -> Result<Period, String> {
-        let after = |start_ms: i64, ms: i64| {
-            Period::new(time(start_ms)?, time(start_ms + ms)?).map_err(|e| e.to_string())
-        };
+        let after = |start: CalendarDate, ms: i64| between(start, later(start, ms)?);
         let named = match at {
             // An end is the first instant that does not belong to the period.
             Some(StampAt::End) => before(stamp)?,
@@ -82,30 +82,61 @@ impl Covers {
             (Self::Month, _) => Period::month(named.year, named.month).map_err(text),
             (Self::Year, _) => Period::year(named.year).map_err(text),
             (Self::Days(count), at) => {
-                let first_ms = midnight(named)?.ms();
+                let first = CalendarDate {
+                    second: 0.0,
+                    ..named
+                };
                 let days = match at {
                     None | Some(StampAt::Start) => 0,
                     // Of an even number the stamp is the midnight in the middle, of an odd one its middle day.
                     Some(StampAt::Middle) => i64::from(count) / 2,
                     Some(StampAt::End) => i64::from(count) - 1,
                 };
-                after(first_ms - days * DAY_MS, i64::from(count) * DAY_MS)
+                after(later(first, -days * DAY_MS)?, i64::from(count) * DAY_MS)
             }
             (Self::Hours(count), at) => {
-                let (stamp_ms, ms) = (instant(stamp)?.ms(), i64::from(count) * HOUR_MS);
+                let ms = i64::from(count) * HOUR_MS;
                 let early_ms = match at {
                     None | Some(StampAt::Start) => 0,
                     Some(StampAt::Middle) => ms / 2,
                     Some(StampAt::End) => ms,
                 };
-                after(stamp_ms - early_ms, ms)
+                after(later(stamp, -early_ms)?, ms)
             }
         }
     }
 }
 
+/// The period from one date to another of the same calendar, in the real one.
+///
+/// Of a calendar of models it is as long as the real one has it, but for a step of at most a day beside a 29 February that its
+/// calendar lacks: such a step stays as long as it is, so that none is two days long and the day is missing.
+///
+/// # Errors
+/// A date is no day of the real calendar, or the first one is not before the other.
+pub(crate) fn between(start: CalendarDate, end: CalendarDate) -> Result<Period, String> {
+    let (from, to) = (instant(start)?, instant(end)?);
+    let own_ms = end
+        .count_ms()
+        .zip(start.count_ms())
+        .map(|(end_ms, start_ms)| end_ms - start_ms)
+        .filter(|ms| *ms <= DAY_MS && !start.calendar.is_real());
+    let (from, to) = match own_ms {
+        // With the day that it ends.
+        Some(ms) if end.second <= 0.0 => (from, time(from.ms() + ms)?),
+        Some(ms) => (time(to.ms() - ms)?, to),
+        None => (from, to),
+    };
+    Period::new(from, to).map_err(|e| e.to_string())
+}
+
 fn time(ms: i64) -> Result<TimeMs, String> {
     TimeMs::new(ms).map_err(|e| e.to_string())
+}
+
+/// The date so much later in its own calendar.
+fn later(date: CalendarDate, ms: i64) -> Result<CalendarDate, String> {
+    date.later(ms).ok_or_else(|| format!("{date} {TOO_FAR}"))
 }
 
 /// The date just before: the day before for a midnight.
@@ -113,37 +144,18 @@ fn before(date: CalendarDate) -> Result<CalendarDate, String> {
     if date.second > 0.0 {
         return Ok(date);
     }
-    let (year, month) = (date.year, date.month);
-    // The day before the first of a month is some day of the month before, in every calendar.
-    let (year, month, day) = match (month, date.day) {
-        (1, 1) => (year - 1, 12, 0),
-        (_, 1) => (year, month - 1, 0),
-        (_, day) => (year, month, day - 1),
-    };
-    if day > 0 {
-        return Ok(CalendarDate {
-            year,
-            month,
-            day,
-            ..date
-        });
-    }
-    let end_ms = midnight(date)?.ms();
-    let start = Period::month(year, month).map_err(|e| e.to_string())?.start;
-    let day = ((end_ms - start.ms()) / DAY_MS) as u32;
-    Ok(CalendarDate {
-        year,
-        month,
-        day,
-        ..date
-    })
+    later(date, -DAY_MS)
 }
 
 fn midnight(date: CalendarDate) -> Result<TimeMs, String> {
     let missing = |_| {
+        let date = CalendarDate {
+            second: 0.0,
+            ..date
+        };
         format!(
-            "{}-{:02}-{:02} is no day of the real calendar; only monthly steps can be read from this one",
-            date.year, date.month, date.day
+            "{date} is a day of the calendar {} and none of the real one; give means over whole months or years, or times of the real calendar",
+            date.calendar.name()
         )
     };
     TimeMs::from_ymd(date.year, date.month, date.day).map_err(missing)
@@ -249,6 +261,71 @@ mod tests {
         assert_eq!(
             period(Covers::Hours(6), noon(2010, 1, 1), StampAt::Middle),
             six_hours
+        );
+    }
+
+    #[test]
+    fn steps_of_a_calendar_without_leap_days_are_of_their_own_days() {
+        let noleap = |month, day, hour: f64| CalendarDate {
+            second: hour * 3600.0,
+            calendar: Calendar::NoLeap,
+            ..stamp(2004, month, day)
+        };
+        let period = |covers: Covers, stamp, at| {
+            let period = covers.period_at(stamp, Some(at)).unwrap().to_string();
+            period.replace(":00:00Z", "").replace("2004-", "")
+        };
+        let day = Covers::Days(1);
+        // 29 February is missing, whichever way a day is named.
+        for (stamp, at) in [
+            (noleap(2, 28, 12.0), StampAt::Middle),
+            (noleap(2, 28, 0.0), StampAt::Start),
+            (noleap(3, 1, 0.0), StampAt::End),
+        ] {
+            assert_eq!(period(day, stamp, at), "02-28T00/02-29T00", "{at:?}");
+        }
+        let six_hours = period(Covers::Hours(6), noleap(3, 1, 0.0), StampAt::Middle);
+        assert_eq!(six_hours, "02-29T21/03-01T03");
+        // Five days of the file follow each other without a gap, and the real calendar has six of them there.
+        let five = |month, day| period(Covers::Days(5), noleap(month, day, 0.0), StampAt::Start);
+        assert_eq!(
+            [five(2, 25), five(3, 2)],
+            ["02-25T00/03-02T00", "03-02T00/03-07T00"]
+        );
+    }
+
+    #[test]
+    fn days_that_the_real_calendar_lacks_are_named() {
+        let of = |calendar, month, day| {
+            let date = CalendarDate {
+                calendar,
+                ..stamp(2001, month, day)
+            };
+            Covers::Days(1).period(date)
+        };
+        for (calendar, day, name) in [
+            (
+                Calendar::Days360,
+                30,
+                "2001-02-30 is a day of the calendar 360_day",
+            ),
+            (
+                Calendar::AllLeap,
+                29,
+                "2001-02-29 is a day of the calendar all_leap",
+            ),
+        ] {
+            let refused = of(calendar, 2, day).unwrap_err();
+            assert!(refused.starts_with(name), "{refused}");
+        }
+        assert!(of(Calendar::AllLeap, 3, 1).is_ok());
+        let month = CalendarDate {
+            calendar: Calendar::Days360,
+            ..stamp(2001, 2, 30)
+        };
+        assert_eq!(
+            Covers::Month.period(month).unwrap(),
+            Period::month(2001, 2).unwrap()
         );
     }
 

@@ -1,9 +1,9 @@
 //! Stamps without bounds to periods: from their distances, and where in its period each is likely to stand.
 
-use contract::time::{Period, TimeMs};
+use contract::time::Period;
 
 use super::calendar::CalendarDate;
-use super::period::{Covers, StampAt, instant};
+use super::period::{Covers, StampAt, between};
 
 const DAY_MS: i64 = 86_400_000;
 const HOUR_MS: i64 = 3_600_000;
@@ -18,9 +18,11 @@ pub(crate) struct Spacing {
     pub(crate) assumption: Option<&'static str>,
 }
 
-/// How long steps of intervals are, from the distance of their stamps; none if that does not tell.
+/// How long steps of intervals are, from the distance of their stamps, which rise, in their own calendar; none if that does not
+/// tell.
 pub(crate) fn of(stamps: &[CalendarDate]) -> Option<Spacing> {
-    let times = times(stamps).ok()?;
+    let times = times(stamps)?;
+    let year_days = stamps.first()?.calendar.year_days();
     let spacings = times.windows(2).map(|pair| pair[1] - pair[0]);
     let (low, high) = (spacings.clone().min()?, spacings.max()?);
     let months: Vec<i64> = stamps
@@ -37,7 +39,7 @@ pub(crate) fn of(stamps: &[CalendarDate]) -> Option<Spacing> {
     if each_in_the_next_month && low >= 27 * DAY_MS {
         return Some(holding(Covers::Month, stamps, |s| s.day == 1));
     }
-    if low >= 364 * DAY_MS && high <= 367 * DAY_MS {
+    if low >= (year_days - 1) * DAY_MS && high <= (year_days + 2) * DAY_MS {
         return Some(holding(Covers::Year, stamps, |s| {
             (s.month, s.day) == (1, 1)
         }));
@@ -83,8 +85,15 @@ fn holding(
 /// Steps of days. Those of several days are counted from the first of January, as the makers of such composites do.
 fn of_days(days: u32, first: CalendarDate, first_time: i64) -> Spacing {
     let of_day_ms = first_time.rem_euclid(DAY_MS);
-    let day_of_year = Period::year(first.year)
-        .map_or(0, |year| (first_time - year.start.ms()).div_euclid(DAY_MS));
+    let new_year = CalendarDate {
+        month: 1,
+        day: 1,
+        second: 0.0,
+        ..first
+    };
+    let day_of_year = new_year
+        .count_ms()
+        .map_or(0, |start| (first_time - start).div_euclid(DAY_MS));
     let place = day_of_year % i64::from(days);
     let is_noon = of_day_ms * 2 == DAY_MS;
     let (at, assumption) = match (days, of_day_ms) {
@@ -115,26 +124,33 @@ fn of_days(days: u32, first: CalendarDate, first_time: i64) -> Spacing {
     }
 }
 
-/// The periods for which values at instants stand: half way to the neighbours. At least two instants, in order.
+/// The periods for which values at instants stand: half way to the neighbours. At least two instants, which rise.
 pub(crate) fn around(stamps: &[CalendarDate]) -> Result<Vec<Period>, String> {
-    let times = times(stamps)?;
-    let is_ordered = times.windows(2).all(|pair| pair[0] < pair[1]);
-    let (Some(first), Some(last), true) =
-        (times.first(), times.last(), is_ordered && times.len() > 1)
-    else {
-        return Err("has fewer than two instants, or not in their order; say in a profile what a step covers".to_owned());
+    let few = || "has fewer than two instants; say in a profile what a step covers".to_owned();
+    let times = times(stamps)
+        .filter(|times| times.len() > 1)
+        .ok_or_else(few)?;
+    let halves: Vec<i64> = times
+        .windows(2)
+        .map(|pair| (pair[1] - pair[0]) / 2)
+        .collect();
+    let after = |(stamp, ms): (&CalendarDate, i64)| {
+        let edge = stamp.later(ms);
+        edge.ok_or_else(|| format!("has a step about {stamp} that leads past the years 1 to 9998"))
     };
-    let mut edges = vec![first - (times[1] - first) / 2];
-    edges.extend(times.windows(2).map(|pair| i64::midpoint(pair[0], pair[1])));
-    edges.push(last + (last - times[times.len() - 2]) / 2);
-    let time = |ms: i64| TimeMs::new(ms).map_err(|e| e.to_string());
-    let period =
-        |pair: &[i64]| Period::new(time(pair[0])?, time(pair[1])?).map_err(|e| e.to_string());
-    edges.windows(2).map(period).collect()
+    let before_first = stamps.iter().take(1).zip([-halves[0]]);
+    let after_each = halves.iter().chain(halves.last()).copied();
+    let edges = before_first.chain(stamps.iter().zip(after_each)).map(after);
+    let edges = edges.collect::<Result<Vec<_>, String>>()?;
+    edges
+        .windows(2)
+        .map(|pair| between(pair[0], pair[1]))
+        .collect()
 }
 
-fn times(stamps: &[CalendarDate]) -> Result<Vec<i64>, String> {
-    stamps.iter().map(|s| instant(*s).map(TimeMs::ms)).collect()
+/// Milliseconds of stamps on the count of their calendar.
+fn times(stamps: &[CalendarDate]) -> Option<Vec<i64>> {
+    stamps.iter().map(|s| s.count_ms()).collect()
 }
 
 #[cfg(test)]
@@ -236,7 +252,40 @@ mod tests {
                 "2001-01-01T09:00:00Z/2001-01-01T15:00:00Z"
             ]
         );
-        let backwards: Vec<_> = stamps.iter().rev().copied().collect();
-        assert!(around(&stamps[..1]).is_err() && around(&backwards).is_err());
+        assert!(around(&stamps[..1]).is_err());
+    }
+
+    /// Distances are those of the calendar of the file: 28 February and 1 March follow each other in one without leap days.
+    #[test]
+    fn steps_of_a_model_are_told_in_its_own_calendar() {
+        let stamps = |calendar, dates: &[(i32, u32, u32)]| {
+            let stamp = |(year, month, day): &(i32, u32, u32)| CalendarDate {
+                calendar,
+                ..stamp(*year, *month, *day, 12.0)
+            };
+            dates.iter().map(stamp).collect::<Vec<_>>()
+        };
+        let days = stamps(
+            Calendar::NoLeap,
+            &[(2004, 2, 27), (2004, 2, 28), (2004, 3, 1)],
+        );
+        assert_eq!(of(&days).unwrap().covers, Covers::Days(1));
+        let around: Vec<_> = around(&days)
+            .unwrap()
+            .iter()
+            .map(Period::to_string)
+            .collect();
+        assert_eq!(around[1], "2004-02-28T00:00:00Z/2004-02-29T00:00:00Z");
+        assert_eq!(around[2], "2004-03-01T00:00:00Z/2004-03-02T00:00:00Z");
+        let months = stamps(
+            Calendar::Days360,
+            &[(2001, 1, 30), (2001, 2, 30), (2001, 3, 30)],
+        );
+        assert_eq!(of(&months).unwrap().covers, Covers::Month);
+        let years = stamps(
+            Calendar::Days360,
+            &[(2001, 7, 1), (2002, 7, 1), (2003, 7, 1)],
+        );
+        assert_eq!(of(&years).unwrap().covers, Covers::Year);
     }
 }

@@ -179,7 +179,8 @@ impl Profile {
         }
         profile.rules = Some(Digest::of_json(&rules));
         if let Some(unit) = &profile.variable.unit {
-            crate::plan::unit::parse(unit).map_err(|e| bad(format!("unit {unit:?} {e}")))?;
+            let read = crate::plan::unit::of(profile.quantity, unit);
+            read.map_err(|e| bad(format!("unit {unit:?} {e}")))?;
         }
         if let Some(TimeRules {
             from: TimeSource::FileName(pattern),

@@ -4,6 +4,7 @@
 //! more than a factor: *of what* a mass or amount is (carbon or CO2), and months, whose length depends on the step.
 
 mod parse;
+mod salinity;
 mod symbol;
 
 use chrono::{Datelike as _, NaiveDate};
@@ -11,6 +12,7 @@ use contract::quantity::{CARBON_KG_PER_MOL, Quantity};
 use contract::time::Period;
 
 pub(crate) use parse::parse;
+pub(crate) use salinity::is_salinity;
 
 /// Mass of one mole of CO2, kg (IUPAC 2021: carbon 12.011, oxygen 15.999).
 const CO2_KG_PER_MOL: f64 = 0.044_009;
@@ -81,7 +83,7 @@ impl Unit {
             return self.to_open(quantity);
         }
         let Ok(target) = parse(quantity.unit()) else {
-            return Err(format!("no unit for {quantity:?}"));
+            return Err(format!("cannot be brought to that of {}", quantity.word()));
         };
         let months = self.dimension.month;
         // A month is a time; its length comes with the step.
@@ -128,6 +130,16 @@ impl Unit {
             offset: (self.offset - target.offset) / target.factor,
             months: 0,
         })
+    }
+}
+
+/// The unit that a spelling is for values of a quantity, or what is wrong. Of salinity all that people write mean the same number,
+/// and what is none of them (parts in a million or a hundred) is refused rather than taken for a share of 1.
+pub(crate) fn of(quantity: Quantity, spelling: &str) -> Result<Unit, String> {
+    match quantity {
+        Quantity::Salinity if is_salinity(spelling) => parse("1"),
+        Quantity::Salinity => Err(wrong_kind(quantity)),
+        _ => parse(spelling),
     }
 }
 

@@ -1,6 +1,7 @@
 //! Units against values worked out by hand, and spellings that must be refused.
 
 use super::*;
+use crate::plan::cf::quantity::of_standard_name;
 use proptest::prelude::*;
 
 /// Factor from the spelling to kg C m-2 s-1 for a step of one month.
@@ -208,6 +209,92 @@ fn every_stored_unit_parses_to_itself() {
             (1.0, 0.0),
             "{quantity:?}"
         );
+    }
+}
+
+/// Factors to stored units of the units that the conventions' table (version 93) has for the standard names that are known.
+#[test]
+fn canonical_units_of_the_conventions_are_read() {
+    let month = Period::month(2001, 1).unwrap();
+    for (name, unit, factor) in [
+        (
+            "surface_upward_mass_flux_of_carbon_dioxide_expressed_as_carbon",
+            "kg m-2 s-1",
+            1.0,
+        ),
+        (
+            "surface_downward_mass_flux_of_carbon_dioxide_expressed_as_carbon",
+            "kg m-2 s-1",
+            1.0,
+        ),
+        (
+            "surface_upward_mass_flux_of_carbon_dioxide",
+            "kg m-2 s-1",
+            0.012_011 / 0.044_009,
+        ),
+        (
+            "surface_upward_mole_flux_of_carbon_dioxide",
+            "mol m-2 s-1",
+            0.012_011,
+        ),
+        ("sea_surface_temperature", "K", 1.0),
+        ("sea_surface_skin_temperature", "K", 1.0),
+        ("sea_surface_subskin_temperature", "K", 1.0),
+        ("sea_surface_foundation_temperature", "K", 1.0),
+        (
+            "mass_concentration_of_chlorophyll_a_in_sea_water",
+            "kg m-3",
+            1.0,
+        ),
+        ("wind_speed", "m s-1", 1.0),
+        (
+            "surface_partial_pressure_of_carbon_dioxide_in_sea_water",
+            "Pa",
+            1.0,
+        ),
+        ("fugacity_of_carbon_dioxide_in_sea_water", "Pa", 1.0),
+        ("sea_surface_salinity", "1e-3", 1.0),
+        ("sea_water_salinity", "1e-3", 1.0),
+        ("sea_water_practical_salinity", "1", 1.0),
+        ("air_pressure_at_mean_sea_level", "Pa", 1.0),
+        ("sea_ice_area_fraction", "1", 1.0),
+        ("sea_area_fraction", "1", 1.0),
+        ("land_area_fraction", "1", 1.0),
+        ("sea_surface_wave_significant_height", "m", 1.0),
+        ("precipitation_flux", "kg m-2 s-1", 1.0),
+        ("rainfall_flux", "kg m-2 s-1", 1.0),
+        ("lwe_precipitation_rate", "m s-1", 1000.0),
+        ("rainfall_rate", "m s-1", 1000.0),
+        ("eastward_sea_water_velocity", "m s-1", 1.0),
+        ("surface_altitude", "m", 1.0),
+        ("sea_floor_depth_below_geoid", "m", 1.0),
+    ] {
+        let named = of_standard_name(name).unwrap();
+        let read = of(named.quantity, unit).unwrap();
+        let conversion = read.to_quantity(named.quantity, named.substance).unwrap();
+        let (found, offset) = conversion.for_period(month).unwrap();
+        close(found, factor);
+        assert!(offset.abs() <= 0.0, "{name}");
+    }
+}
+
+#[test]
+fn salinity_is_the_number_that_it_is_or_refused() {
+    for spelling in [
+        "1e-3", "0.001", "1.E-03", "PSU", "g/kg", "1", "PSS-78", "psu ",
+    ] {
+        let unit = of(Quantity::Salinity, spelling).unwrap();
+        let conversion = unit.to_quantity(Quantity::Salinity, None).unwrap();
+        let month = Period::month(2001, 1).unwrap();
+        assert_eq!(
+            conversion.for_period(month).unwrap(),
+            (1.0, 0.0),
+            "{spelling}"
+        );
+    }
+    for spelling in ["%", "ppm", "kg/kg", "mg/kg", "K", "1e-6"] {
+        let refused = of(Quantity::Salinity, spelling).unwrap_err();
+        assert!(refused.contains("no unit of salinity"), "{refused}");
     }
 }
 

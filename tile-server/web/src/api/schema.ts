@@ -1392,6 +1392,8 @@ export interface components {
         OpenQuantity: {
             /** @description What its values mean, where they are codes, in the order of values: `flag_values` and `flag_meanings` of CF. */
             flags?: components["schemas"]["Flag"][];
+            /** @description Is the name the CF standard name that a file states, so that other programs may be told it as such? */
+            is_standard_name?: boolean;
             /** @description Its CF standard name, or else its long name or the variable's: lower-case letters, digits and `_`, a letter first. */
             name: string;
             /** @description Lowest and highest stored value, outwards to two digits; none if that is not known. */
