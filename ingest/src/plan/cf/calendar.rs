@@ -41,6 +41,8 @@ pub(crate) struct TimeUnit {
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum CalendarStep {
     Seconds(f64),
+    /// So many to a second: divided by, whole seconds stay whole.
+    PerSecond(f64),
     Months(i32),
 }
 
@@ -134,7 +136,15 @@ impl TimeUnit {
         let (step, date) = lower.split_once(" since ").ok_or_else(bad)?;
         let step = match step.trim() {
             "seconds" | "second" | "sec" | "secs" | "s" => CalendarStep::Seconds(1.0),
-            "milliseconds" | "millisecond" | "msec" | "ms" => CalendarStep::Seconds(1e-3),
+            "milliseconds" | "millisecond" | "msec" | "msecs" | "ms" => {
+                CalendarStep::PerSecond(1e3)
+            }
+            "microseconds" | "microsecond" | "microsec" | "microsecs" | "usec" | "us" => {
+                CalendarStep::PerSecond(1e6)
+            }
+            "nanoseconds" | "nanosecond" | "nanosec" | "nanosecs" | "nsec" | "ns" => {
+                CalendarStep::PerSecond(1e9)
+            }
             "minutes" | "minute" | "min" | "mins" => CalendarStep::Seconds(60.0),
             "hours" | "hour" | "hr" | "hrs" | "h" => CalendarStep::Seconds(3600.0),
             "days" | "day" | "d" => CalendarStep::Seconds(DAY_S),
@@ -161,18 +171,20 @@ impl TimeUnit {
             second,
             calendar,
         } = self.reference;
-        match self.step {
-            CalendarStep::Seconds(step_s) => {
-                let total_s = number * step_s + second;
-                let days = (total_s / DAY_S).floor();
-                if !days.is_finite() || days.abs() > MAX_DAYS {
-                    return Err(bad());
-                }
-                let start = calendar.day_number(year, month, day).ok_or_else(bad)?;
-                calendar
-                    .date(start + days as i64, total_s - days * DAY_S)
-                    .ok_or_else(bad)
+        let after_s = |since_s: f64| {
+            let total_s = since_s + second;
+            let days = (total_s / DAY_S).floor();
+            if !days.is_finite() || days.abs() > MAX_DAYS {
+                return Err(bad());
             }
+            let start = calendar.day_number(year, month, day).ok_or_else(bad)?;
+            calendar
+                .date(start + days as i64, total_s - days * DAY_S)
+                .ok_or_else(bad)
+        };
+        match self.step {
+            CalendarStep::Seconds(step_s) => after_s(number * step_s),
+            CalendarStep::PerSecond(count) => after_s(number / count),
             // Calendar months and years, as people who write them mean it; UDUNITS would take 30.44 days.
             CalendarStep::Months(per_step) => {
                 if !(number.is_finite() && number.abs() < 120_000.0) {
@@ -300,6 +312,19 @@ mod tests {
             date("Days since 1970-01-01T00:00:00Z", "standard", 0.25),
             "1970-01-01 21600"
         );
+    }
+
+    #[test]
+    fn parts_of_a_second_are_counted_too() {
+        for (unit, number) in [
+            ("milliseconds since 1970-01-01", 1_577_923_200_000.0),
+            ("microseconds since 1970-01-01", 1_577_923_200_000_000.0),
+            ("nanoseconds since 1970-01-01", 1_577_923_200_000_000_000.0),
+            ("us since 2020-01-01T12:00:00", 43_200_000_000.0),
+            ("ns since 2020-01-01 18:00", 21_600_000_000_000.0),
+        ] {
+            assert_eq!(date(unit, "standard", number), "2020-01-02 0", "{unit}");
+        }
     }
 
     #[test]

@@ -118,11 +118,11 @@ fn of_days(days: u32, first: CalendarDate, first_time: i64) -> Spacing {
 /// The periods for which values at instants stand: half way to the neighbours. At least two instants, in order.
 pub(crate) fn around(stamps: &[CalendarDate]) -> Result<Vec<Period>, String> {
     let times = times(stamps)?;
-    let is_ordered = times.windows(2).all(|pair| pair[0] < pair[1]);
-    let (Some(first), Some(last), true) =
-        (times.first(), times.last(), is_ordered && times.len() > 1)
-    else {
-        return Err("has fewer than two instants, or not in their order; say in a profile what a step covers".to_owned());
+    if let Some(disorder) = disorder(&times) {
+        return Err(disorder);
+    }
+    let (Some(first), Some(last), true) = (times.first(), times.last(), times.len() > 1) else {
+        return Err("has fewer than two instants; say in a profile what a step covers".to_owned());
     };
     let mut edges = vec![first - (times[1] - first) / 2];
     edges.extend(times.windows(2).map(|pair| i64::midpoint(pair[0], pair[1])));
@@ -131,6 +131,51 @@ pub(crate) fn around(stamps: &[CalendarDate]) -> Result<Vec<Period>, String> {
     let period =
         |pair: &[i64]| Period::new(time(pair[0])?, time(pair[1])?).map_err(|e| e.to_string());
     edges.windows(2).map(period).collect()
+}
+
+/// Why the distance of stamps does not tell how long steps are, with the first place where it does not.
+pub(crate) fn untold(stamps: &[CalendarDate]) -> String {
+    let advice = "say in a profile what a step covers";
+    let times = match times(stamps) {
+        Ok(times) => times,
+        Err(reason) => return reason,
+    };
+    if let Some(disorder) = disorder(&times) {
+        return disorder;
+    }
+    let gap = |at: usize| times[at + 1] - times[at];
+    let mut odd = 1..times.len().saturating_sub(1);
+    match odd.find(|at| gap(*at) != gap(0)) {
+        Some(at) => format!(
+            "has stamps at uneven distances: {} and {} are the first two, and {} and {} are at the indexes {at} and {}; {advice}",
+            shown(times[0]),
+            shown(times[1]),
+            shown(times[at]),
+            shown(times[at + 1]),
+            at + 1
+        ),
+        None => format!("has stamps whose distance is no length of steps that is known; {advice}"),
+    }
+}
+
+/// What is wrong with the order of stamps, at the first place where it is; none if each is later than the one before.
+fn disorder(times: &[i64]) -> Option<String> {
+    let at = times.windows(2).position(|pair| pair[0] >= pair[1])?;
+    let (one, other) = (shown(times[at]), shown(times[at + 1]));
+    let next = at + 1;
+    Some(if times[at] == times[next] {
+        format!(
+            "has one stamp twice: {one} at the indexes {at} and {next}; leave one of the steps out"
+        )
+    } else {
+        format!(
+            "goes back in time: from {one} at the index {at} to {other} at {next}; sort the steps, or give the axis bounds"
+        )
+    })
+}
+
+fn shown(time_ms: i64) -> String {
+    TimeMs::new(time_ms).map_or_else(|e| e.to_string(), |time| time.to_string())
 }
 
 fn times(stamps: &[CalendarDate]) -> Result<Vec<i64>, String> {
@@ -236,7 +281,31 @@ mod tests {
                 "2001-01-01T09:00:00Z/2001-01-01T15:00:00Z"
             ]
         );
-        let backwards: Vec<_> = stamps.iter().rev().copied().collect();
-        assert!(around(&stamps[..1]).is_err() && around(&backwards).is_err());
+        assert!(around(&stamps[..1]).unwrap_err().contains("fewer than two"));
+    }
+
+    #[test]
+    fn stamps_out_of_order_are_told_with_their_places() {
+        let day = |day| stamp(2001, 1, day, 0.0);
+        for (days, said) in [
+            (
+                [3, 2, 1],
+                "goes back in time: from 2001-01-03T00:00:00Z at the index 0 to 2001-01-02T00:00:00Z at 1",
+            ),
+            (
+                [1, 2, 2],
+                "one stamp twice: 2001-01-02T00:00:00Z at the indexes 1 and 2",
+            ),
+        ] {
+            let stamps = days.map(day);
+            assert_eq!(told(&stamps), None);
+            for reason in [untold(&stamps), around(&stamps).unwrap_err()] {
+                assert!(reason.contains(said), "{reason}");
+            }
+        }
+        let uneven = untold(&[day(1), day(2), day(5)]);
+        for part in ["uneven", "2001-01-05T00:00:00Z", "the indexes 1 and 2"] {
+            assert!(uneven.contains(part), "{part}: {uneven}");
+        }
     }
 }
