@@ -13,8 +13,9 @@ mod failures;
 mod hierarchy;
 mod objects;
 mod read_only;
+mod state;
 
-pub use array::{Absent, ArrayKind, ForeignArray};
+pub use array::{Absent, ArrayKind, ForeignArray, as_stored};
 pub use error::ForeignError;
 pub use hierarchy::{Changed, Foreign, Found};
 pub use objects::{Objects, StoredObjects};

@@ -23,6 +23,7 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use clap::{CommandFactory as _, FromArgMatches as _};
+use storage::attached::Failure;
 
 use crate::cli::{Cli, Command, Settings};
 
@@ -70,8 +71,12 @@ fn failed(error: &anyhow::Error) -> ExitCode {
     ExitCode::FAILURE
 }
 
-/// An error and its causes, each said once: layers of stores say what the ones below them said.
+/// An error and its causes, each said once: layers of stores say what the ones below them said. What failed in a store of others is
+/// told as that alone, with store, array and chunk: all around it is how we came there.
 fn told(error: &anyhow::Error) -> String {
+    if let Some(failure) = Failure::behind(error.as_ref()) {
+        return failure.to_string();
+    }
     let mut text = String::new();
     for cause in error.chain().map(ToString::to_string) {
         if !text.contains(&cause) {
@@ -95,5 +100,25 @@ mod tests {
         assert_eq!(told(&error), "landing b: writing a: the disk is full");
         let error = anyhow::anyhow!("c").context("reading d");
         assert_eq!(told(&error), "reading d: c");
+    }
+
+    #[test]
+    fn what_failed_in_a_store_of_others_is_told_alone_and_once() {
+        let failure = Failure {
+            place: "/data/sst.zarr array sst chunk [0, 0, 0]".to_owned(),
+            reason: "is damaged".to_owned(),
+            cause: storage::attached::Cause::Content,
+        };
+        let text = failure.to_string();
+        let error = storage::StorageError::Object {
+            key: "frames/sst/x.parquet".to_owned(),
+            source: object_store::Error::Generic {
+                store: "attached store",
+                source: failure.into(),
+            },
+        };
+        assert_eq!(error.to_string(), text);
+        let error = anyhow::Error::from(error).context("reading a field");
+        assert_eq!(told(&error), text);
     }
 }

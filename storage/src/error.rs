@@ -10,7 +10,7 @@ use crate::failure::Failure;
 #[derive(Debug, thiserror::Error)]
 pub enum StorageError {
     /// The object store refused or lost a request.
-    #[error("object {key:?}: {source}")]
+    #[error("{}", of_object(key, source))]
     Object {
         key: String,
         source: object_store::Error,
@@ -87,6 +87,14 @@ impl StorageError {
             object: object.into(),
             reason: reason.to_string(),
         }
+    }
+}
+
+/// What failed: of a field that lies in a store of others that store, and the reference to it is no part of the matter.
+fn of_object(key: &str, source: &object_store::Error) -> String {
+    match Failure::behind(source) {
+        Some(failure) => failure.to_string(),
+        None => format!("object {key:?}: {source}"),
     }
 }
 

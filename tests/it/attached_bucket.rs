@@ -403,6 +403,8 @@ fn credentials_that_end_and_buckets_that_go_are_errors_that_name_the_chunk_and_n
                 !talk.contains("--refresh") && !talk.contains("sound"),
                 "{talk}"
             );
+            // How we came there is no part of what failed there.
+            assert!(!talk.contains("attached store error"), "{talk}");
         }
     }
     bucket.gate.open();

@@ -3,13 +3,17 @@
 use std::ops::Range;
 use std::sync::Arc;
 
+use half::f16;
+use icechunk::session::Session;
 use serde_json::{Map, Value};
+use tokio::sync::RwLock;
 use zarrs::array::{Array, ArrayMetadata, AsyncArrayShardedReadableExtCache, FillValueMetadata};
 use zarrs::plugin::ExtensionName as _;
 use zarrs::storage::AsyncReadableStorageTraits;
 
 use super::error::ForeignError;
 use super::failures::Failures;
+use super::state;
 
 /// Most dimensions of an array.
 const MAX_RANK: usize = 32;
@@ -23,7 +27,7 @@ pub enum ArrayKind {
     Integer(u8),
     /// Unsigned integers of this many bytes.
     Unsigned(u8),
-    /// Floating point of this many bytes: 4 or 8.
+    /// Floating point of this many bytes: 2, 4 or 8.
     Float(u8),
     /// Text, complex numbers, records and whatever else is no number.
     Other,
@@ -36,6 +40,8 @@ pub enum Absent {
     Fill,
     /// Nothing that can be told from a value: it is refused.
     Refused,
+    /// The same of a coordinate: a place or a time that was lost looks like one that is the fill value.
+    RefusedOfCoordinate,
 }
 
 /// An array of others.
@@ -46,6 +52,8 @@ pub struct ForeignArray {
     pub dimensions: Vec<(Option<String>, u64)>,
     /// How values are stored.
     pub kind: ArrayKind,
+    /// The same in Zarr's words.
+    type_name: String,
     /// Its attributes.
     pub attributes: Map<String, Value>,
     /// What stands for what was not written; none where the array defines none, or is of no numbers.
@@ -56,6 +64,8 @@ pub struct ForeignArray {
     pub(super) place: String,
     /// What its store failed at.
     pub(super) failures: Arc<Failures>,
+    /// Of a repository: tells where a chunk lies.
+    session: Option<Arc<RwLock<Session>>>,
     pub(super) inner: Array<dyn AsyncReadableStorageTraits>,
     /// Indexes of shards.
     pub(super) shards: AsyncArrayShardedReadableExtCache,
@@ -86,30 +96,51 @@ impl ForeignArray {
             Some(names) => names.clone(),
             None => names_of(&attributes, shape.len()),
         };
-        let kind = inner.data_type().name_v3();
-        let kind = kind.map_or(ArrayKind::Other, |name| kind_of(&name));
+        let type_name = inner.data_type().name_v3().unwrap_or_default().into_owned();
+        let kind = kind_of(&type_name);
         let fill = inner.fill_value().as_ne_bytes();
         Ok(Self {
             name: name.to_owned(),
             dimensions: names.into_iter().zip(shape.iter().copied()).collect(),
             kind,
+            type_name,
             fill: number(kind, fill).filter(|_| is_filled),
             attributes,
             is_zarr2,
             shards: AsyncArrayShardedReadableExtCache::new(&inner),
             place,
             failures: Arc::clone(failures),
+            session: None,
             inner,
         })
     }
 
-    /// Bytes of one value; none of what is no number.
-    pub(super) fn value_bytes(&self) -> Option<u64> {
+    /// The same of a repository, if it is of one.
+    pub(super) fn of(self, session: Option<Arc<RwLock<Session>>>) -> Self {
+        Self { session, ..self }
+    }
+
+    /// Where a chunk lies that is not in its repository.
+    pub(super) async fn elsewhere(&self, index: &[u64]) -> Option<String> {
+        state::elsewhere(self.session.as_deref()?, &self.name, index).await
+    }
+
+    /// Bytes of one value.
+    ///
+    /// # Errors
+    /// It holds no numbers of a kind that is read.
+    pub fn value_bytes(&self) -> Result<u64, ForeignError> {
         match self.kind {
             ArrayKind::Integer(bytes) | ArrayKind::Unsigned(bytes) | ArrayKind::Float(bytes) => {
-                Some(bytes.into())
+                Ok(bytes.into())
             }
-            ArrayKind::Other => None,
+            ArrayKind::Other => {
+                let reason = format!(
+                    "holds values of the type {:?}: read are integers of 8 to 64 bits, and float16, float32 and float64",
+                    self.type_name
+                );
+                Err(ForeignError::refused(&self.place, reason))
+            }
         }
     }
 
@@ -144,9 +175,7 @@ impl ForeignArray {
     /// # Errors
     /// They are too many.
     pub(super) fn chunk_bytes(&self, cells: &[Range<u64>]) -> Result<u64, ForeignError> {
-        let value_bytes = self.value_bytes().ok_or_else(|| {
-            ForeignError::refused(&self.place, "holds no numbers of a kind that is read")
-        })?;
+        let value_bytes = self.value_bytes()?;
         let bytes = cells.iter().fold(value_bytes, |bytes, cells| {
             bytes.saturating_mul(cells.end - cells.start)
         });
@@ -184,9 +213,19 @@ fn kind_of(name: &str) -> ArrayKind {
         "uint16" => ArrayKind::Unsigned(2),
         "uint32" => ArrayKind::Unsigned(4),
         "uint64" => ArrayKind::Unsigned(8),
+        "float16" => ArrayKind::Float(2),
         "float32" => ArrayKind::Float(4),
         "float64" => ArrayKind::Float(8),
         _ => ArrayKind::Other,
+    }
+}
+
+/// A number as it is where values are stored so: what attributes say in more digits is rounded there. Half precision alone needs it;
+/// of single precision planning knows it.
+pub fn as_stored(kind: ArrayKind, number: f64) -> f64 {
+    match kind {
+        ArrayKind::Float(2) => f16::from_f64(number).into(),
+        _ => number,
     }
 }
 
@@ -210,6 +249,7 @@ pub(super) fn number(kind: ArrayKind, bytes: &[u8]) -> Option<f64> {
         ArrayKind::Unsigned(2) => of!(u16).into(),
         ArrayKind::Unsigned(4) => of!(u32).into(),
         ArrayKind::Unsigned(_) => of!(u64) as f64,
+        ArrayKind::Float(2) => of!(f16).into(),
         ArrayKind::Float(4) => of!(f32).into(),
         ArrayKind::Float(_) => of!(f64),
         ArrayKind::Other => return None,

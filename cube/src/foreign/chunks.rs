@@ -61,8 +61,9 @@ impl Chunks {
         });
         let mut read = stream::iter(read).buffered(CHUNKS_AT_ONCE);
         while let Some((index, cells, chunk)) = read.try_next().await? {
-            if absent == Absent::Refused {
-                check_there(array, (&index, &cells), part, chunk.is_some()).await?;
+            if absent != Absent::Fill {
+                let missing = |place: &str| missing(array, place, absent);
+                check_there(array, (&index, &cells), (part, chunk.is_some()), &missing).await?;
             }
             let fill = array.fill.unwrap_or(f64::NAN);
             copy(
@@ -97,7 +98,18 @@ async fn unpacked(
     let bytes = array.chunk_bytes(cells)?;
     let place = || format!("{} chunk {index:?}", array.place);
     let packed = array.inner.async_retrieve_encoded_chunk(index).await;
-    let packed = packed.map_err(|e| array.failures.told(&place(), "reading it", &e))?;
+    let packed = match packed.map_err(|e| array.failures.told(&place(), "reading it", &e)) {
+        Ok(packed) => packed,
+        Err(told) => {
+            let Some(location) = array.elsewhere(index).await else {
+                return Err(told);
+            };
+            let reason = format!(
+                "is not in the repository but refers to {location} (a virtual chunk), and such references are not followed: write its values into the repository, or land the files that it refers to"
+            );
+            return Err(ForeignError::refused(place(), reason));
+        }
+    };
     let Some(packed) = packed else {
         return Ok(None);
     };
@@ -140,27 +152,35 @@ async fn unpacked(
     Ok(Some(Arc::new(decoded)))
 }
 
-/// Refuses a part of which something is not there, where that cannot be told from values.
+/// The refusal of a chunk that is not there, where that cannot be told from values.
+fn missing(array: &ForeignArray, place: &str, absent: Absent) -> ForeignError {
+    let name = &array.name;
+    let reason = match (absent, array.fill) {
+        (Absent::RefusedOfCoordinate, Some(fill)) if fill.is_finite() => format!(
+            "is not there, so that each of its places or times would be the fill value {fill}: if that is right, have it written (xarray: encoding={{\"{name}\": {{\"write_empty_chunks\": True}}}}; docs/open-data.md has the way for a store that is there), else write it again, or state it in a profile"
+        ),
+        (Absent::RefusedOfCoordinate, _) => {
+            "is not there, and a coordinate has a value everywhere: write it again".to_owned()
+        }
+        (_, None) => "is not there, and its array defines no fill value: nothing tells whether it was never written; write it, or say _FillValue in the attributes".to_owned(),
+        (_, Some(fill)) => format!(
+            "is not there, and it then stands for the fill value {fill}, which is no missing value here: nothing tells whether it was never written; write it, or say _FillValue in the attributes"
+        ),
+    };
+    ForeignError::refused(format!("{} {place}", array.place), reason)
+}
+
+/// Refuses a part of which something is not there.
 async fn check_there(
     array: &ForeignArray,
     (index, cells): (&[u64], &[Range<u64>]),
-    part: &[Range<u64>],
-    is_there: bool,
+    (part, is_there): (&[Range<u64>], bool),
+    missing: &(dyn Fn(&str) -> ForeignError + Sync),
 ) -> Result<(), ForeignError> {
-    let missing = |index: &[u64]| {
-        let fill = array.fill.map_or_else(
-            || "its array defines no fill value".to_owned(),
-            |fill| {
-                format!("it then stands for the fill value {fill}, which is no missing value here")
-            },
-        );
-        let reason = format!(
-            "is not there, and {fill}: nothing tells whether it was never written; write it, or say _FillValue in the attributes"
-        );
-        ForeignError::refused(format!("{} chunk {index:?}", array.place), reason)
-    };
     if !is_there {
-        return Err(missing(index));
+        let is_shard = array.inner.subchunk_shape().is_some();
+        let what = if is_shard { "shard" } else { "chunk" };
+        return Err(missing(&format!("{what} {index:?}")));
     }
     let Some(inner) = array.inner.subchunk_shape() else {
         return Ok(());
@@ -183,7 +203,7 @@ async fn check_there(
         // The library gives what the index has, where one that is not there has no place but all bits set.
         let is_there = range.is_some_and(|it| !matches!(it, ByteRange::FromStart(u64::MAX, _)));
         if !is_there {
-            return Err(missing(&index));
+            return Err(missing(&format!("chunk {index:?}")));
         }
     }
     Ok(())

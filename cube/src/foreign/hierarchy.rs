@@ -5,11 +5,11 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use bytes::Bytes;
-use icechunk::RepositoryConfig;
-use icechunk::format::SnapshotId;
 use icechunk::repository::VersionInfo;
+use icechunk::session::Session;
 use serde_json::{Map, Value};
 use storage::attached::{Cause, StoreKind};
+use tokio::sync::RwLock;
 use zarrs::array::Array;
 use zarrs::config::MetadataRetrieveVersion;
 use zarrs::storage::{
@@ -23,14 +23,13 @@ use super::chunks::Chunks;
 use super::error::ForeignError;
 use super::failures::{Failures, Noted};
 use super::objects::Objects;
-use super::read_only::ReadOnly;
+use super::state::State;
 use crate::error::first_lines;
-use crate::repository::read_when_needed;
 
-/// The branch of a repository whose newest state is read.
-const BRANCH: &str = "main";
 /// Most arrays of a group that are looked at.
 const MAX_ARRAYS: usize = 4096;
+/// Groups that are told where one without arrays is given.
+const TOLD_GROUPS: usize = 8;
 
 /// What was found at an address.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -48,9 +47,13 @@ pub struct Foreign {
     /// Attributes of the group.
     pub attributes: Map<String, Value>,
     arrays: BTreeMap<String, Result<ForeignArray, ForeignError>>,
+    /// Some groups in it, where it has no arrays.
+    groups: Vec<String>,
     chunks: Chunks,
     place: String,
     failures: Arc<Failures>,
+    /// Of a repository: its chunks.
+    session: Option<Arc<RwLock<Session>>>,
     /// Of a repository: tells what changed between its states.
     repository: Option<icechunk::Repository>,
 }
@@ -129,16 +132,17 @@ impl Foreign {
         let (objects, failures) = Noted::of(objects);
         match found.kind {
             StoreKind::Icechunk => {
-                let opened = repository(objects, (found, &failures)).await?;
-                let (repository, store, found) = opened;
+                let (state, found) = state(objects, found, &failures).await?;
+                let store = AsyncIcechunkStore::from(Arc::clone(&state.session));
                 let names = store.list_dir(&StorePrefix::root()).await;
                 let names = names.map_err(|e| failures.told(&place, "listing its arrays", &e))?;
                 let names = names.prefixes().iter();
                 let names = names.map(|name| name.as_str().trim_end_matches('/').to_owned());
                 let wanted = Wanted::All(names.collect());
                 let store: Arrays = Arc::new(store);
-                let mut own = Self::of((store, found), (place, failures), wanted).await?;
-                own.repository = Some(repository);
+                let store = (store, Some(state.session));
+                let mut own = Self::of(store, (found, place, failures), wanted).await?;
+                own.repository = state.repository;
                 Ok(own)
             }
             StoreKind::Zarr2 | StoreKind::Zarr3 => {
@@ -156,8 +160,8 @@ impl Foreign {
                     }
                 };
                 let documents = Arc::new(documents);
-                let adapter = Adapter { objects, documents };
-                Self::of((Arc::new(adapter), found), (place, failures), wanted).await
+                let store: Arrays = Arc::new(Adapter { objects, documents });
+                Self::of((store, None), (found, place, failures), wanted).await
             }
         }
     }
@@ -173,35 +177,38 @@ impl Foreign {
     ) -> Result<Self, ForeignError> {
         let place = objects.place();
         let (objects, failures) = Noted::of(objects);
-        let (store, found): (Arrays, Found) = match found.kind {
+        let (store, session, found): (Arrays, _, Found) = match found.kind {
             StoreKind::Icechunk => {
-                let opened = repository(objects, (found, &failures)).await?;
-                let (_repository, store, found) = opened;
-                (Arc::new(store), found)
+                let (state, found) = state(objects, found, &failures).await?;
+                let store = AsyncIcechunkStore::from(Arc::clone(&state.session));
+                (Arc::new(store), Some(state.session), found)
             }
             StoreKind::Zarr2 | StoreKind::Zarr3 => {
                 let documents = Arc::default();
-                (Arc::new(Adapter { objects, documents }), found)
+                (Arc::new(Adapter { objects, documents }), None, found)
             }
         };
-        let own = Self::of((store, found), (place, failures), Wanted::One(array)).await?;
+        let (store, wanted) = ((store, session), Wanted::One(array));
+        let own = Self::of(store, (found, place, failures), wanted).await?;
         // Who keeps it open must not keep what may pass.
         own.array(array)?;
         Ok(own)
     }
 
     async fn of(
-        (store, found): (Arrays, Found),
-        (place, failures): (String, Arc<Failures>),
+        (store, session): (Arrays, Option<Arc<RwLock<Session>>>),
+        (found, place, failures): (Found, String, Arc<Failures>),
         wanted: Wanted<'_>,
     ) -> Result<Self, ForeignError> {
         let mut own = Self {
             attributes: Map::new(),
             arrays: BTreeMap::new(),
+            groups: vec![],
             chunks: Chunks::default(),
             place,
             failures,
             found,
+            session,
             repository: None,
         };
         match wanted {
@@ -213,8 +220,11 @@ impl Foreign {
                     return Err(ForeignError::refused(own.place, reason));
                 }
                 own.attributes = group(&store, own.found.kind, (&own.place, &own.failures)).await?;
-                for name in names {
-                    own.add(&store, &name).await;
+                for name in &names {
+                    own.add(&store, name).await;
+                }
+                if own.arrays().next().is_none() {
+                    own.groups = groups(&store, own.found.kind, &names).await;
                 }
             }
             Wanted::Around(name) => {
@@ -241,7 +251,8 @@ impl Foreign {
         };
         let opened = Array::async_open_opt(Arc::clone(store), &format!("/{name}"), &version).await;
         let array = match opened {
-            Ok(array) => ForeignArray::new(name, (&self.place, &self.failures), array),
+            Ok(array) => ForeignArray::new(name, (&self.place, &self.failures), array)
+                .map(|array| array.of(self.session.clone())),
             Err(zarrs::array::ArrayCreateError::MissingMetadata) => return,
             Err(e) => {
                 let place = format!("{} array {name}", self.place);
@@ -287,7 +298,19 @@ impl Foreign {
             Some(Err(error)) => Err(error.clone()),
             None => {
                 let there: Vec<&str> = self.arrays().map(|array| array.name.as_str()).collect();
-                let reason = format!("has no array {name:?}; it has {}", there.join(", "));
+                let groups = self.groups.join(", ");
+                let rest = match (self.groups.first(), self.found.kind) {
+                    _ if !there.is_empty() => format!("; it has {}", there.join(", ")),
+                    (None, _) => ", nor any other that can be read".to_owned(),
+                    (Some(_), StoreKind::Icechunk) => format!(
+                        " but groups ({groups}), and of a repository the arrays of its root are read"
+                    ),
+                    (Some(first), _) => format!(
+                        " but groups ({groups}): give the one with the array, {}/{first} say",
+                        self.place
+                    ),
+                };
+                let reason = format!("has no array {name:?}{rest}");
                 Err(ForeignError::refused(&self.place, reason))
             }
         }
@@ -354,34 +377,15 @@ impl Foreign {
     }
 }
 
-/// Opens a state of a repository.
-async fn repository(
+/// Opens a state of a repository, and says which.
+async fn state(
     objects: Arc<dyn Objects>,
-    (found, failures): (Found, &Failures),
-) -> Result<(icechunk::Repository, AsyncIcechunkStore, Found), ForeignError> {
-    let place = objects.place();
-    let refused = |doing: &str, e: &dyn std::fmt::Display| failures.told(&place, doing, e);
-    let opened = icechunk::Repository::open(Arc::new(ReadOnly(objects)))
-        .config(read_when_needed(RepositoryConfig::default()));
-    let opened = opened.execute().await;
-    let opened = opened.map_err(|e| refused("opening the Icechunk repository", &e))?;
-    let snapshot: SnapshotId = match &found.snapshot {
-        Some(text) => text.as_str().try_into().map_err(|_no_name: &str| {
-            refused("opening a state", &format!("{text:?} names none"))
-        })?,
-        None => opened
-            .lookup_branch(BRANCH)
-            .await
-            .map_err(|e| refused("reading the branch main", &e))?,
-    };
-    let version = VersionInfo::SnapshotId(snapshot.clone());
-    let session = opened.readonly_session(&version).await;
-    let session = session.map_err(|e| refused(&format!("opening the state {snapshot}"), &e))?;
-    let found = Found {
-        snapshot: Some(snapshot.to_string()),
-        ..found
-    };
-    Ok((opened, AsyncIcechunkStore::new(session), found))
+    found: Found,
+    failures: &Failures,
+) -> Result<(State, Found), ForeignError> {
+    let state = State::open(objects, found.snapshot.as_deref(), failures).await?;
+    let snapshot = Some(state.snapshot.to_string());
+    Ok((state, Found { snapshot, ..found }))
 }
 
 /// Documents of all arrays that came in one; nothing where they lie apart.
@@ -435,6 +439,28 @@ fn named(documents: &BTreeMap<String, Bytes>) -> Vec<String> {
         matches!(document, "zarr.json" | ".zarray").then(|| name.to_owned())
     };
     documents.keys().filter_map(name).collect()
+}
+
+/// The first groups of these names.
+async fn groups(store: &Arrays, kind: StoreKind, names: &[String]) -> Vec<String> {
+    let document = match kind {
+        StoreKind::Zarr2 => ".zgroup",
+        StoreKind::Zarr3 | StoreKind::Icechunk => "zarr.json",
+    };
+    let mut groups = vec![];
+    for name in names.iter().take(TOLD_GROUPS) {
+        let Ok(key) = StoreKey::new(format!("{name}/{document}")) else {
+            continue;
+        };
+        let Ok(Some(content)) = store.get(&key).await else {
+            continue;
+        };
+        let says = serde_json::from_slice::<Value>(&content).unwrap_or_default();
+        if kind == StoreKind::Zarr2 || says["node_type"] == "group" {
+            groups.push(name.clone());
+        }
+    }
+    groups
 }
 
 /// Attributes of the group.

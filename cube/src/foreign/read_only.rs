@@ -35,6 +35,10 @@ fn read_only<T>() -> StorageResult<T> {
     Err(other("an attached store is only read".to_owned()))
 }
 
+/// What a repository of version 1 says of how it is written, and where virtual chunks lie: nothing that a reader of its chunks needs,
+/// and it may name what the library was built without here.
+const CONFIGURATION: &str = "config.yaml";
+
 /// What one state names is there as long as the state is.
 fn missing(name: &str) -> StorageError {
     let folder = name.split_once('/').map(|(folder, _)| folder);
@@ -48,6 +52,9 @@ fn missing(name: &str) -> StorageError {
 
 impl ReadOnly {
     async fn read(&self, name: &str, range: Option<&Range<u64>>) -> StorageResult<Bytes> {
+        if name == CONFIGURATION {
+            return Err(missing(name));
+        }
         // What this program wrote has seals, which are of the whole; others write none.
         let may_be_sealed = sound::cube::sealed(name, &[]).is_some();
         let part = range

@@ -1,4 +1,4 @@
-//! What changed between two states of a repository, and damage of what names its chunks.
+//! What changed between two states of a repository, damage of what names its chunks, and chunks that lie elsewhere.
 
 use std::ops::Range;
 use std::path::Path as FilePath;
@@ -7,12 +7,20 @@ use std::sync::Arc;
 use contract::grid::Grid;
 use contract::quantity::Quantity;
 use contract::time::Period;
+use icechunk::asset_manager::AssetManager;
+use icechunk::format::format_constants::SpecVersionBin;
+use icechunk::format::manifest::{ChunkPayload, VirtualChunkLocation, VirtualChunkRef};
+use icechunk::format::repo_info::RepoInfo;
 use icechunk::format::snapshot::NodeData;
 use icechunk::format::{ChunkIndices, Path};
+use icechunk::storage::Settings;
+use icechunk::virtual_chunks::VirtualChunkContainer;
+use icechunk::{ObjectStoreConfig, RepositoryConfig};
 use storage::Store;
 use storage::attached::StoreKind;
 use tempfile::TempDir;
 
+use super::read_only::ReadOnly;
 use super::{Absent, Foreign, ForeignError, Found, StoredObjects};
 use crate::{Description, Edit, Repository, cf};
 
@@ -68,6 +76,37 @@ impl Other {
         assert!(payload.is_some());
         session.set_chunk_ref(path, second, payload).await.unwrap();
         session.commit("one chunk").execute().await.unwrap();
+    }
+
+    /// Has the second chunk be a part of a file elsewhere.
+    async fn refer_second_to(&self, location: &str) {
+        let session = self.repository.session().await.unwrap();
+        let mut session = session.write().await;
+        let path = Path::new(&format!("/{}", variable())).unwrap();
+        let chunk = VirtualChunkRef {
+            location: VirtualChunkLocation::from_url(location).unwrap(),
+            offset: 0,
+            length: 8,
+            checksum: None,
+        };
+        let (second, chunk) = (ChunkIndices(vec![0, 0, 1]), ChunkPayload::Virtual(chunk));
+        let set = session.set_chunk_ref(path, second, Some(chunk));
+        set.await.unwrap();
+        session.commit("elsewhere").execute().await.unwrap();
+    }
+
+    /// Gives it another configuration.
+    async fn configure(&self, config: &impl serde::Serialize) {
+        let inner = &self.repository.inner;
+        let version = inner.spec_version();
+        let update = |info: Arc<RepoInfo>, backup: &str, _version| {
+            Ok(Arc::new(
+                info.set_config(version, config, backup, 100).unwrap(),
+            ))
+        };
+        let retries = inner.config().repo_update_retries();
+        let update = inner.asset_manager().update_repo_info(retries, update);
+        update.await.unwrap();
     }
 
     /// Its one step, with a value for each of its chunks.
@@ -226,4 +265,80 @@ async fn a_flipped_bit_of_what_names_the_chunks_is_an_error() {
         std::fs::write(file, whole).unwrap();
     }
     assert!(read(&other, 0).await.is_ok());
+}
+
+/// The library is never asked for what lies elsewhere, and says nothing of it: the reader does.
+#[tokio::test]
+async fn a_virtual_chunk_is_refused_with_where_it_lies_and_all_others_are_read() {
+    let other = Other::new().await;
+    let mut config = RepositoryConfig::default();
+    let container = VirtualChunkContainer::new(
+        "s3://theirs/".to_owned(),
+        ObjectStoreConfig::S3(icechunk::config::S3Options::default()),
+    );
+    config
+        .set_virtual_chunk_container(container.unwrap())
+        .unwrap();
+    other.configure(&config).await;
+    for location in ["s3://theirs/sst.nc", "https://theirs.example/sst.nc"] {
+        other
+            .refer_second_to(&format!("{location}?signature=secret"))
+            .await;
+        let west = read(&other, 0).await.unwrap();
+        assert_eq!(west[0].to_bits(), 290f64.to_bits());
+        let error = read(&other, SECOND).await.unwrap_err().to_string();
+        for part in [
+            &format!("array {} chunk [0, 0, 1]", variable())[..],
+            location,
+            "virtual chunk",
+        ] {
+            assert!(error.contains(part), "{part}: {error}");
+        }
+        assert!(!error.contains("secret"), "{error}");
+    }
+}
+
+/// What the library was built without here is needed by nobody who reads what lies in the repository.
+#[tokio::test]
+async fn a_repository_with_containers_of_other_kinds_is_read() {
+    let other = Other::new().await;
+    let before = other.state().await;
+    for (prefix, kind) in [
+        ("file:///theirs/", "local_file_system"),
+        ("gcs://theirs/", "gcs"),
+    ] {
+        let container =
+            serde_json::json!({"name": "theirs", "url_prefix": prefix, "store": {kind: {}}});
+        let config = serde_json::json!({"virtual_chunk_containers": {prefix: container}});
+        other.configure(&config).await;
+        let store = Store::open(other.folder.path().to_str().unwrap()).unwrap();
+        assert!(Repository::open(&store, "p").await.is_err(), "{prefix}");
+        let west = read(&other, 0).await.unwrap();
+        assert_eq!(west[0].to_bits(), 290f64.to_bits());
+        assert_eq!(other.state().await, before);
+    }
+    // A state that is pinned, and one array alone.
+    let objects = Arc::new(StoredObjects::open(other.path().to_str().unwrap()).unwrap());
+    let found = Found {
+        kind: StoreKind::Icechunk,
+        snapshot: Some(before),
+    };
+    let one = Foreign::open_one(objects, found, &variable())
+        .await
+        .unwrap();
+    let values = one.read(&variable(), &part(0..1), Absent::Refused).await;
+    assert_eq!(values.unwrap()[0].to_bits(), 290f64.to_bits());
+}
+
+/// Repositories of version 1 have it in an object of its own.
+#[tokio::test]
+async fn the_configuration_of_a_repository_of_version_1_is_never_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = "virtual_chunk_containers: {theirs: {url_prefix: 'file:///theirs/', store: {local_file_system: /theirs}}}";
+    std::fs::write(folder.path().join("config.yaml"), text).unwrap();
+    let objects = StoredObjects::open(folder.path().to_str().unwrap()).unwrap();
+    let storage = Arc::new(ReadOnly(Arc::new(objects)));
+    let settings = Settings::default();
+    let assets = AssetManager::new_no_cache(storage, settings, SpecVersionBin::V1, 1, 16);
+    assert!(assets.fetch_config().await.unwrap().is_none());
 }

@@ -25,13 +25,15 @@ and AZURE_*, alike. A bucket need not let itself be listed: then its metadata ar
 What is refused there (credentials that have ended, a bucket that is gone, a wrong region) is an error that says so with store, array and
 chunk; it is not taken for a chunk that was never written.
 
-What came since, or was revised, comes with --refresh, as the product's next version. A product that was landed is not attached over.
+What came since, or was revised, comes with --refresh, as the product's next version. A product that was landed is not attached over, and one
+that is attached to another store, array or index only with --replace.
 
 Examples:
   fluxglobe attach /data/sst.zarr --variable analysed_sst --product sst-attached
   fluxglobe attach s3://BUCKET/flux.icechunk --variable fgco2
   AWS_REGION=us-west-2 fluxglobe attach s3://PUBLIC-BUCKET/sst.zarr --variable analysed_sst
   fluxglobe attach /data/ocean.zarr --variable thetao --index depth=0
+  fluxglobe attach /new/place/sst.zarr --variable analysed_sst --product sst-attached --replace
   fluxglobe attach --refresh sst-attached")]
 pub(crate) struct Attach {
     /// Where the store is: a folder, or `s3://BUCKET/PREFIX`, `gs://BUCKET/PREFIX`, `az://CONTAINER/PREFIX`, `https://HOST/PATH`.
@@ -51,8 +53,12 @@ pub(crate) struct Attach {
     /// be given several times.
     #[arg(long, value_name = "DIMENSION=INDEX", value_parser = index)]
     pub(crate) index: Vec<(String, u64)>,
+    /// Where the product is attached to another store, array or index already, have this be its next version: a store that moved, say.
+    /// Without it that is refused.
+    #[arg(long)]
+    pub(crate) replace: bool,
     /// Attach anew what this product is attached to: steps that came since or were revised become its next version.
-    #[arg(long, value_name = "PRODUCT", conflicts_with_all = ["url", "variable", "profile", "product", "index"])]
+    #[arg(long, value_name = "PRODUCT", conflicts_with_all = ["url", "variable", "profile", "product", "index", "replace"])]
     pub(crate) refresh: Option<ProductId>,
     /// JSON instead of text.
     #[arg(long)]

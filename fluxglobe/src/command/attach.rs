@@ -47,6 +47,7 @@ pub(crate) async fn run(settings: &Settings, options: &Attach) -> Result<()> {
             profile: options.profile.clone(),
             product: options.product.clone(),
             indexes: options.index.clone(),
+            replace: options.replace,
         };
         ingest::attach::attach(&store, &request, &told).await
     };

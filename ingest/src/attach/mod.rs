@@ -45,6 +45,8 @@ pub struct Request {
     pub product: Option<ProductId>,
     /// Which index is read of dimensions beside time and the map.
     pub indexes: Vec<(String, u64)>,
+    /// May it follow on what the product was attached to before, where that was another store, array or index?
+    pub replace: bool,
 }
 
 /// What came of it.
@@ -95,7 +97,7 @@ impl From<Stop> for AttachError {
 /// Attaches a store of others; `told` is called with the number of steps that are done and of all.
 ///
 /// The product keeps the versions it has. A product that was landed or computed is refused, so that what is copied and what is
-/// not stays apart.
+/// not stays apart; so is one that is attached to something else, unless the request says that it is to be replaced.
 ///
 /// # Errors
 /// `Refused` with what in the store cannot be read rightly, before anything is published.
@@ -106,7 +108,7 @@ pub async fn attach(
 ) -> Result<Attached, AttachError> {
     let profile = request.profile.as_deref().map(Profile::find).transpose()?;
     let survey = Survey::of(request, profile.as_ref(), Limits::default()).await?;
-    let attached = publish::publish(store, survey, told).await?;
+    let attached = publish::publish(store, survey, request.replace, told).await?;
     Ok(attached)
 }
 
@@ -148,5 +150,7 @@ fn request_of(before: &Attachment) -> Result<Request, IngestError> {
         profile: reading.profile,
         product: Some(before.product.clone()),
         indexes: reading.indexes.into_iter().collect(),
+        // It is what was attached, however its address may be written by now.
+        replace: true,
     })
 }

@@ -8,10 +8,12 @@ use contract::key::ObjectKey;
 use contract::manifest::{MANIFEST_SCHEMA, Manifest, Step};
 use contract::product::ProductId;
 use contract::quantity::Quantity;
+use storage::attached::Attachment;
 use storage::{StorageError, Store, domain, fields, manifests};
 
 use super::Attached;
 use super::kept::kept;
+use super::reading::Reading;
 use super::steps::{self, Put};
 use super::survey::Survey;
 use crate::commit;
@@ -19,15 +21,18 @@ use crate::error::{IngestError, Rejection, Stop};
 use crate::pipeline::grids::without_values;
 use crate::plan::PlannedStep;
 
-/// Reads all steps and publishes them as the next version.
+/// Reads all steps and publishes them as the next version; of a product that is attached to something else only if it may `replace`
+/// that.
 pub(super) async fn publish(
     store: &Store,
     survey: Survey,
+    replace: bool,
     told: &(dyn Fn(usize, usize) + Send + Sync),
 ) -> Result<Attached, Stop> {
     let product = survey.plan.target.product.clone();
     // Before a value is read: what would be refused at the end is refused now.
-    let kept = match newest(store, &product).await? {
+    let only = (!replace).then_some(&survey.attachment);
+    let kept = match newest(store, &product, only).await? {
         Some(newest) => {
             let target = &survey.plan.target;
             check_fits(
@@ -71,14 +76,14 @@ pub(super) async fn publish(
     // The way back, before anybody goes it: address, credentials and all that the attachment keeps.
     let first = fields::read(store, &read.steps[0].field, &plan.mapping.grid).await;
     first.map_err(IngestError::storage("read an attached step again"))?;
-    let quantity = over(plan.target.quantity, read.range)?;
     let next = Next {
         product: &product,
         title: &plan.target.title,
         source: &plan.target.source,
-        quantity,
+        quantity: over(plan.target.quantity, read.range)?,
         synthetic: plan.target.synthetic,
         grid: plan.mapping.grid,
+        only: (!replace).then_some(&attachment),
     };
     let domain = is_all.then_some(&read.domain[..]);
     let (version, is_new) = next_version(store, &next, (&read.steps, domain)).await?;
@@ -113,26 +118,59 @@ struct Next<'a> {
     quantity: Quantity,
     synthetic: bool,
     grid: Grid,
+    /// What the version before must be attached to; anything, if absent.
+    only: Option<&'a Attachment>,
 }
 
-async fn newest(store: &Store, product: &ProductId) -> Result<Option<Manifest>, Stop> {
+/// The version to follow on, which must be attached to the same as `only`.
+async fn newest(
+    store: &Store,
+    product: &ProductId,
+    only: Option<&Attachment>,
+) -> Result<Option<Manifest>, Stop> {
     let newest = manifests::latest(store, product).await;
     let newest = newest.map_err(IngestError::storage("read the newest manifest"))?;
     let Some(newest) = newest else {
         return Ok(None);
     };
     let attached = store.attached_to(&newest).await;
-    if attached
-        .map_err(IngestError::storage("read what it is attached to"))?
-        .is_none()
-    {
-        return Err(IngestError::Attach {
+    let attached = attached.map_err(IngestError::storage("read what it is attached to"))?;
+    let refused = match (&attached, only) {
+        (None, _) => Some("it is there, and its values were landed or computed here; attach as another product (--product)".to_owned()),
+        (Some(before), Some(now)) => is_another(before, now)?,
+        (Some(_), None) => None,
+    };
+    match refused {
+        None => Ok(Some(newest)),
+        Some(detail) => Err(IngestError::Attach {
             product: product.to_string(),
-            detail: "it is there, and its values were landed or computed here; attach as another product (--product)".to_owned(),
+            detail,
         }
-        .into());
+        .into()),
     }
-    Ok(Some(newest))
+}
+
+/// Why a product that is attached to one thing is not attached to another unasked; none if it is the same thing.
+fn is_another(before: &Attachment, now: &Attachment) -> Result<Option<String>, IngestError> {
+    let indexes = |of: &Attachment| {
+        let reading = Reading::of(of).map_err(|detail| IngestError::Attach {
+            product: of.product.to_string(),
+            detail,
+        })?;
+        let each = reading.indexes.iter();
+        Ok::<_, IngestError>(each.fold(String::new(), |text, (name, index)| {
+            format!("{text} --index {name}={index}")
+        }))
+    };
+    let (was, is) = (indexes(before)?, indexes(now)?);
+    if (&before.store, &before.array, &was) == (&now.store, &now.array, &is) {
+        return Ok(None);
+    }
+    Ok(Some(format!(
+        "it is attached to {}{was}, and this is {}{is}; attach as another product (--product), or say --replace if its next version is to be this",
+        before.place(),
+        now.place()
+    )))
 }
 
 fn check_fits(
@@ -164,7 +202,7 @@ async fn next_version(
 ) -> Result<(Manifest, bool), Stop> {
     let mut pauses = commit::attempts();
     loop {
-        let newest = newest(store, next.product).await?;
+        let newest = newest(store, next.product, next.only).await?;
         let (mut grid, mut quantity) = (next.grid, next.quantity);
         if let Some(newest) = &newest {
             check_fits(newest, next.grid, (next.quantity, next.synthetic))?;

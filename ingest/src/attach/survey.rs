@@ -52,6 +52,7 @@ impl Survey {
         let foreign = Foreign::open(objects, found, Some(variable)).await;
         let foreign = Arc::new(foreign.map_err(arrays::stopped)?);
         let array = foreign.array(variable).map_err(arrays::stopped)?;
+        array.value_bytes().map_err(arrays::stopped)?;
         let indexes: Indexes = request.indexes.iter().cloned().collect();
         let description = arrays::describe(&foreign, &indexes)?;
         let fill = array.fill;

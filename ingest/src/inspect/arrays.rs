@@ -7,7 +7,7 @@ use std::sync::Arc;
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use contract::event::RejectReason;
-use cube::foreign::{Absent, ArrayKind, Foreign, ForeignArray, ForeignError};
+use cube::foreign::{Absent, ArrayKind, Foreign, ForeignArray, ForeignError, as_stored};
 use serde_json::{Map, Value};
 
 use super::file::description::{
@@ -18,6 +18,9 @@ use crate::error::{IngestError, Rejection, Stop};
 
 /// Which index is read of dimensions beside time and the map, by their names.
 pub(crate) type Indexes = BTreeMap<String, u64>;
+
+/// Attributes that hold stored numbers which stand for no data.
+const FILLS: [&str; 2] = ["_FillValue", "missing_value"];
 
 /// Arrays that are read.
 #[derive(Clone)]
@@ -70,10 +73,11 @@ impl Arrays {
     ) -> Result<Vec<f64>, ForeignError> {
         let array = self.foreign.array(variable)?;
         let ranges = Self::ranges(array, &self.indexes, part);
+        // What else is read of a store are coordinates and their bounds.
         let absent = if self.absent.0 == variable {
             self.absent.1
         } else {
-            Absent::Fill
+            Absent::RefusedOfCoordinate
         };
         self.foreign.read(variable, &ranges, absent).await
     }
@@ -150,6 +154,13 @@ fn variable(array: &ForeignArray, indexes: &Indexes) -> Variable {
         ArrayKind::Other => Kind::Other,
     };
     let mut attributes = attributes(&array.attributes, kind);
+    for name in FILLS {
+        if let Some(AttributeValue::Numbers { bits, .. }) = attributes.0.get_mut(name) {
+            for number in bits {
+                *number = as_stored(array.kind, number.number()).into();
+            }
+        }
+    }
     // Zarr version 2 has it where version 3 has a value for what was not written, which may be one like any other.
     if let (true, Some(fill)) = (array.is_zarr2, array.fill) {
         let fill = AttributeValue::Numbers {
@@ -218,8 +229,7 @@ fn attribute(name: &str, value: &Value, kind: Kind) -> Option<AttributeValue> {
 
 /// A number that JSON cannot hold: by its name, or (as xarray writes fill values in Zarr version 3) in base 64.
 fn number_of_text(name: &str, text: &str, kind: Kind) -> Option<f64> {
-    let is_fill = matches!(name, "_FillValue" | "missing_value");
-    if !is_fill || !matches!(kind, Kind::Float(_)) {
+    if !FILLS.contains(&name) || !matches!(kind, Kind::Float(_)) {
         return None;
     }
     let in_base_64 = || {

@@ -6,6 +6,7 @@ use super::Planning;
 use super::edges::{self, Along};
 use crate::error::{Rejection, Stop};
 use crate::inspect::file::description::{Dimension, Variable};
+use crate::inspect::values::Values;
 use crate::plan::cf::axis::{Mapping, Registration};
 use crate::plan::cf::coordinate::{self, Axis, Evidence, Role};
 use crate::plan::cf::corner;
@@ -39,7 +40,8 @@ pub(super) async fn mapping(
     let (Some(lat), Some(lon)) = (find(Role::Latitude), find(Role::Longitude)) else {
         return Err(coordinate::no_grid(planning.file, variable).into());
     };
-    check_others(variable, &axes)?;
+    let is_of_a_store = matches!(planning.values, Values::Arrays(_));
+    check_others(variable, &axes, is_of_a_store)?;
     let (cells, most) = (
         u128::from(lat.len) * u128::from(lon.len),
         planning.limits.plane_cells,
@@ -63,6 +65,17 @@ pub(super) async fn mapping(
         Some(stated) => stated_mapping(variable, stated, &lat, &lon)?,
         None => read_mapping(planning, &rules, &lat, &lon).await?,
     };
+    if (mapping.file_cols.len() as u64) < lon.len {
+        let gone = if mapping.file_cols.contains(&0) {
+            "last"
+        } else {
+            "first"
+        };
+        planning.assume(format!(
+            "{}: its first and its last column are a turn apart, which is one place; the {gone} is left out, whatever it holds",
+            lon.coordinate.as_ref().unwrap_or(&variable.name)
+        ));
+    }
     Ok((axes, mapping))
 }
 
@@ -153,7 +166,7 @@ fn name_time(planning: &Planning<'_>, variable: &Variable, axes: &mut [Axis]) {
 }
 
 /// Refuses two axes of one role, and further axes of more than one level.
-fn check_others(variable: &Variable, axes: &[Axis]) -> Result<(), Rejection> {
+fn check_others(variable: &Variable, axes: &[Axis], is_of_a_store: bool) -> Result<(), Rejection> {
     for role in [Role::Latitude, Role::Longitude, Role::Time] {
         if axes.iter().filter(|a| a.role == role).count() > 1 {
             return Err(refused(
@@ -162,21 +175,32 @@ fn check_others(variable: &Variable, axes: &[Axis]) -> Result<(), Rejection> {
             ));
         }
     }
-    let deep = axes
-        .iter()
-        .zip(&variable.dimensions)
-        .find(|(a, _)| a.role == Role::Other && a.len != 1);
-    match deep {
-        None => Ok(()),
-        Some((axis, dimension)) => {
-            let name = dimension.name.as_deref().unwrap_or("without a name");
-            let detail = format!(
-                "has {} levels along dimension {name:?}; give a file with one level",
-                axis.len
-            );
-            Err(refused(&variable.name, detail))
-        }
+    let both = axes.iter().zip(&variable.dimensions);
+    let deep: Vec<&Dimension> = both
+        .filter(|(axis, _)| axis.role == Role::Other && axis.len != 1)
+        .map(|(_, dimension)| dimension)
+        .collect();
+    if deep.is_empty() {
+        return Ok(());
     }
+    let levels = |dimension: &&Dimension| {
+        let name = dimension.name.as_deref().unwrap_or("without a name");
+        format!("{} levels along dimension {name:?}", dimension.len)
+    };
+    let index = |dimension: &&Dimension| {
+        let name = dimension.name.as_ref()?;
+        let last = dimension.len.saturating_sub(1);
+        Some(format!(" --index {name}=N (0 to {last})"))
+    };
+    let indexes: Option<String> = deep.iter().map(index).collect();
+    let advice = match indexes {
+        _ if !is_of_a_store => "give a file with one level".to_owned(),
+        Some(indexes) => format!("say which is read:{indexes}"),
+        None => "name its dimensions (dimension_names, in version 2 _ARRAY_DIMENSIONS), so that --index can say which is read".to_owned(),
+    };
+    let levels: Vec<String> = deep.iter().map(levels).collect();
+    let detail = format!("has {}; {advice}", levels.join(" and "));
+    Err(refused(&variable.name, detail))
 }
 
 /// Notes axes that nothing but their length tells, and refuses those that their length does not tell.

@@ -56,15 +56,7 @@ pub(super) async fn periods(
     if let Some((name, calendar)) = calendar(planning, axes)? {
         model_calendar::check(planning, &name, calendar, &periods)?;
     }
-    let mut sorted = periods.clone();
-    sorted.sort();
-    let overlapping = sorted.windows(2).find(|pair| pair[0].overlaps(pair[1]));
-    if let Some([first, second]) = overlapping {
-        let detail = format!(
-            "has steps that overlap ({first} and {second}); say in a profile what a step covers"
-        );
-        return Err(refused("time", detail).into());
-    }
+    check_apart(&periods)?;
     Ok(periods)
 }
 
@@ -87,6 +79,27 @@ fn calendar(
     };
     let calendar = stamps::calendar(planning, &name, stated)?;
     Ok(Some((name, calendar)))
+}
+
+/// Refuses steps that share some of their time, which would be counted twice.
+fn check_apart(periods: &[Period]) -> Result<(), Rejection> {
+    let mut order: Vec<usize> = (0..periods.len()).collect();
+    order.sort_by_key(|at| periods[*at]);
+    let mut pairs = order.windows(2).map(|pair| (pair[0], pair[1]));
+    let Some((one, other)) = pairs.find(|(one, other)| periods[*one].overlaps(periods[*other]))
+    else {
+        return Ok(());
+    };
+    let (first, second) = (one.min(other), one.max(other));
+    let which = if periods[first] == periods[second] {
+        format!("both are {}", periods[first])
+    } else {
+        format!("{} and {}", periods[first], periods[second])
+    };
+    let detail = format!(
+        "has steps that overlap, at the indexes {first} and {second} ({which}); leave one out, or say in a profile what a step covers"
+    );
+    Err(refused("time", detail))
 }
 
 async fn by_rules(
@@ -269,13 +282,12 @@ fn by_spacing(
             assumption: Some("stamps are taken for the starts of the steps"),
         })
     };
-    let uneven = "has stamps at uneven distances; say in a profile what a step covers";
     let spacing = spacing::of(stamps).or_else(stated);
     let spacing::Spacing {
         covers,
         at,
         assumption,
-    } = spacing.ok_or_else(|| refused(name, uneven))?;
+    } = spacing.ok_or_else(|| refused(name, spacing::untold(stamps)))?;
     if let Some(assumption) = assumption {
         planning.assume(format!(
             "{name}: has no bounds; {assumption} (if they are not, say stamp = \"middle\" or \"end\" in a profile)"

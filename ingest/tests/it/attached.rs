@@ -105,10 +105,11 @@ pub(crate) fn request(address: &str, variable: &str) -> Request {
         profile: None,
         product: None,
         indexes: vec![],
+        replace: false,
     }
 }
 
-fn copy(from: &Path, to: &Path) {
+pub(crate) fn copy(from: &Path, to: &Path) {
     std::fs::create_dir_all(to).unwrap();
     for entry in std::fs::read_dir(from).unwrap() {
         let entry = entry.unwrap();
@@ -524,6 +525,116 @@ async fn a_chunk_that_is_not_there_is_no_data_where_the_conventions_say_so() {
     }
 }
 
+/// A place or a time that was lost would be the fill value of its array, which is one like any other.
+#[tokio::test]
+async fn a_chunk_of_a_coordinate_that_is_not_there_is_refused_with_its_name() {
+    for (name, chunk, said) in [
+        ("v2-plain.zarr", "time/0", "array time chunk [0]"),
+        ("v2-plain.zarr", "lat/0", "array lat chunk [0]"),
+        ("v3-gzip.zarr", "lon/c/0", "array lon chunk [0]"),
+        (
+            "v3-gzip.zarr",
+            "time_bnds/c/0/0",
+            "array time_bnds chunk [0, 0]",
+        ),
+    ] {
+        let own = Own::with(name);
+        std::fs::remove_file(own.path().join(chunk)).unwrap();
+        let error = own.attach().await.unwrap_err();
+        assert!(
+            error.contains(said) && error.contains("is not there"),
+            "{name}: {error}"
+        );
+        let manifests = own.store.list(Kind::Manifest.folder()).await.unwrap();
+        assert_eq!(manifests, [], "{error}");
+    }
+}
+
+/// A chunk of nothing but the fill value may have been left out by its writer: how to have it written is said.
+#[tokio::test]
+async fn a_time_of_zero_that_was_not_written_is_refused_with_what_to_do() {
+    let own = Own::with("v3-gzip.zarr");
+    own.edit("time/zarr.json", |it| {
+        it["chunk_grid"]["configuration"]["chunk_shape"] = json!([1]);
+    });
+    let chunk = |step: i32| own.path().join(format!("time/c/{step}"));
+    for step in 0..3_i32 {
+        std::fs::write(chunk(step), step.to_le_bytes()).unwrap();
+    }
+    own.attach().await.unwrap();
+    std::fs::remove_file(chunk(0)).unwrap();
+    let error = own.attach().await.unwrap_err();
+    for part in [
+        "array time chunk [0]",
+        "the fill value 0",
+        "{\"time\": {\"write_empty_chunks\": True}}",
+    ] {
+        assert!(error.contains(part), "{part}: {error}");
+    }
+}
+
+#[tokio::test]
+async fn a_group_without_arrays_says_which_groups_it_has() {
+    for (name, document, content) in [
+        (
+            "v3-gzip.zarr",
+            "zarr.json",
+            json!({"zarr_format": 3, "node_type": "group"}),
+        ),
+        ("v2-plain.zarr", ".zgroup", json!({"zarr_format": 2})),
+    ] {
+        let own = Own::new();
+        copy(&fixture(name), &own.path().join("ocean"));
+        std::fs::write(own.path().join(document), content.to_string()).unwrap();
+        let error = own.attach().await.unwrap_err();
+        let inner = own.path().join("ocean");
+        for part in [
+            "no array \"sst\"",
+            "groups (ocean)",
+            inner.to_str().unwrap(),
+        ] {
+            assert!(error.contains(part), "{part}: {error}");
+        }
+        let mut request = own.request();
+        request.address = inner.to_str().unwrap().to_owned();
+        own.ask(&request).await.unwrap();
+    }
+}
+
+/// 288 and -999.5 in half precision.
+const HALVES: [u16; 2] = [0x5c80, 0xe3cf];
+
+#[tokio::test]
+async fn values_of_half_precision_are_read_and_what_is_no_number_is_refused_by_its_type() {
+    let own = Own::with("v2-plain.zarr");
+    own.edit("sst/.zarray", |it| it["dtype"] = json!("<f2"));
+    // In the digits of an attribute, and not in those that are stored.
+    own.edit("sst/.zattrs", |it| it["_FillValue"] = json!(-999.6));
+    for step in 0..3 {
+        let mut cells = [HALVES[0]; 48];
+        cells[0] = HALVES[1];
+        let bytes: Vec<u8> = cells.iter().flat_map(|cell| cell.to_le_bytes()).collect();
+        std::fs::write(own.path().join(format!("sst/{step}.0.0")), bytes).unwrap();
+    }
+    let attached = own.attach().await.unwrap();
+    assert!(attached.masked.is_none(), "{attached:?}");
+    let newest = own.newest().await;
+    let values = own.values(&newest, 1).await.unwrap();
+    assert_eq!(values.iter().filter(|value| value.is_nan()).count(), 1);
+    let is_288 = |value: &f32| value.is_nan() || value.to_bits() == 288f32.to_bits();
+    assert!(values.iter().all(is_288), "{values:?}");
+    let own = Own::with("v3-gzip.zarr");
+    own.edit("sst/zarr.json", |it| {
+        it["data_type"] = json!("complex64");
+        it["fill_value"] = json!([0.0, 0.0]);
+    });
+    let error = own.attach().await.unwrap_err();
+    assert!(
+        error.contains("array sst") && error.contains("\"complex64\""),
+        "{error}"
+    );
+}
+
 #[tokio::test]
 async fn of_other_dimensions_one_index_is_read() {
     let own = Own::with("v2-plain.zarr");
@@ -542,7 +653,8 @@ async fn of_other_dimensions_one_index_is_read() {
     own.edit("sst/.zarray", |it| it["shape"] = json!([3, 2, 6, 8]));
     let error = own.attach().await.unwrap_err();
     assert!(
-        error.contains("2 levels along dimension \"depth\""),
+        error.contains("2 levels along dimension \"depth\"")
+            && error.contains("--index depth=N (0 to 1)"),
         "{error}"
     );
     let mut request = own.request();

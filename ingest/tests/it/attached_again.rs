@@ -14,7 +14,7 @@ use serde_json::{Value, json};
 use storage::attached::{Attachment, Reference};
 use storage::{Store, domain, fields, manifests};
 
-use crate::attached::{Own, assert_same, expected, readable, request};
+use crate::attached::{Own, assert_same, copy, expected, readable, request};
 
 const PLAIN: &str = "v2-plain.zarr";
 const GRID: Grid = Grid {
@@ -286,6 +286,54 @@ fn deep() -> Own {
         std::fs::copy(turned, path(format!("{step}.1.0.0"))).unwrap();
     }
     own
+}
+
+#[tokio::test]
+async fn what_a_product_is_attached_to_is_replaced_only_where_that_is_said() {
+    let own = deep();
+    let of_depth = |address: &Path, variable: &str, depth: u64| Request {
+        product: Some("sst".parse().unwrap()),
+        indexes: vec![("depth".to_owned(), depth)],
+        ..request(address.to_str().unwrap(), variable)
+    };
+    let here = own.path();
+    own.ask(&of_depth(&here, "sst", 0)).await.unwrap();
+    let before = own.newest().await;
+    let moved = here.with_file_name("moved.zarr");
+    copy(&here, &moved);
+    copy(&here.join("sst"), &here.join("skin"));
+    let was = format!("{} array sst --index depth=0", here.display());
+    for (next, is) in [
+        (
+            of_depth(&moved, "sst", 0),
+            format!("{} array sst --index depth=0", moved.display()),
+        ),
+        (
+            of_depth(&here, "skin", 0),
+            format!("{} array skin --index depth=0", here.display()),
+        ),
+        (
+            of_depth(&here, "sst", 1),
+            format!("{} array sst --index depth=1", here.display()),
+        ),
+    ] {
+        let error = own.ask(&next).await.unwrap_err();
+        for part in [&was[..], &is[..], "--product", "--replace"] {
+            assert!(error.contains(part), "{part}: {error}");
+        }
+        assert_eq!(own.newest().await, before);
+    }
+    let replacing = Request {
+        replace: true,
+        ..of_depth(&moved, "sst", 0)
+    };
+    let attached = own.ask(&replacing).await.unwrap();
+    assert_eq!((attached.is_new, attached.version.number), (true, 2));
+    // From now on that is what it is attached to.
+    std::fs::remove_dir_all(&here).unwrap();
+    let next = again(&own).await.unwrap();
+    assert_eq!((next.is_new, next.steps), (false, 3));
+    assert_eq!(next.place, moved.display().to_string());
 }
 
 #[tokio::test]

@@ -3,7 +3,7 @@
 use contract::event::RejectReason;
 use ingest::{Outcome, Profile};
 
-use crate::fixture::{Place, refusal};
+use crate::fixture::{Place, SmallFile, refusal};
 use crate::made::{Made, MadeFile, Values};
 
 async fn land(file: &MadeFile) -> Outcome {
@@ -56,6 +56,36 @@ fn on_axes(
     };
     let (y, x) = (axis(0), axis(1));
     file.with(y).with(x)
+}
+
+#[tokio::test]
+async fn a_column_that_is_there_twice_is_left_out_and_told() {
+    let (narrow, wide) = (Place::new(), Place::new());
+    let small = SmallFile::new();
+    small.write_classic(&narrow.path("a.nc"));
+    narrow.land(&[narrow.path("a.nc")]).await;
+    let wider = SmallFile {
+        lon: (0..9).map(|i| -157.5 + 45.0 * f64::from(i)).collect(),
+        values: small
+            .values
+            .chunks(8)
+            .flat_map(|row| [row, &[77.0][..]].concat())
+            .collect(),
+        ..small
+    };
+    wider.write_classic(&wide.path("a.nc"));
+    let outcome = wide.land(&[wide.path("a.nc")]).await.remove(0);
+    let told = assumed(&outcome);
+    assert!(
+        told.iter()
+            .any(|line| line.contains("a turn apart") && line.contains("the last is left out")),
+        "{told:?}"
+    );
+    let bits = async |place: &Place| -> Vec<u32> {
+        let values = place.values(&place.newest("fgco2").await, 0).await;
+        values.into_iter().map(f32::to_bits).collect()
+    };
+    assert_eq!(bits(&wide).await, bits(&narrow).await);
 }
 
 const LAT: [f64; 4] = [67.5, 22.5, -22.5, -67.5];

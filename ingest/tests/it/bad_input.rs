@@ -189,7 +189,13 @@ async fn a_file_without_time_is_refused() {
     let mut file = SmallFile::new();
     file.time = vec![3.0, 3.0];
     file.write_classic(&place.path("twice.nc"));
-    assert_refused(&place, "twice.nc", RejectReason::Time, &["overlap"]).await;
+    assert_refused(
+        &place,
+        "twice.nc",
+        RejectReason::Time,
+        &["overlap", "indexes 0 and 1"],
+    )
+    .await;
 }
 
 #[tokio::test]

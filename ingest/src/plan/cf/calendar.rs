@@ -205,9 +205,15 @@ impl TimeUnit {
         let (step, date) = lower.split_once(" since ").ok_or_else(bad)?;
         let step = match step.trim() {
             "seconds" | "second" | "sec" | "secs" | "s" => CalendarStep::Seconds(1.0),
-            "milliseconds" | "millisecond" | "msec" | "ms" => CalendarStep::PartsOfSecond(1e3),
-            "microseconds" | "microsecond" | "microsec" | "us" => CalendarStep::PartsOfSecond(1e6),
-            "nanoseconds" | "nanosecond" | "nanosec" | "ns" => CalendarStep::PartsOfSecond(1e9),
+            "milliseconds" | "millisecond" | "msec" | "msecs" | "ms" => {
+                CalendarStep::PartsOfSecond(1e3)
+            }
+            "microseconds" | "microsecond" | "microsec" | "microsecs" | "usec" | "us" => {
+                CalendarStep::PartsOfSecond(1e6)
+            }
+            "nanoseconds" | "nanosecond" | "nanosec" | "nanosecs" | "nsec" | "ns" => {
+                CalendarStep::PartsOfSecond(1e9)
+            }
             "minutes" | "minute" | "min" | "mins" => CalendarStep::Seconds(60.0),
             "hours" | "hour" | "hr" | "hrs" | "h" => CalendarStep::Seconds(3600.0),
             "days" | "day" | "d" => CalendarStep::Seconds(DAY_S),
@@ -410,6 +416,19 @@ mod tests {
             let unit = format!("{step} since 1970-01-01");
             let found = date(&unit, "standard", 978_350_401.0 * per_second);
             assert_eq!(found, "2001-01-01 43201", "{step}");
+        }
+    }
+
+    #[test]
+    fn parts_of_a_second_are_counted_too() {
+        for (unit, number) in [
+            ("milliseconds since 1970-01-01", 1_577_923_200_000.0),
+            ("microseconds since 1970-01-01", 1_577_923_200_000_000.0),
+            ("nanoseconds since 1970-01-01", 1_577_923_200_000_000_000.0),
+            ("us since 2020-01-01T12:00:00", 43_200_000_000.0),
+            ("ns since 2020-01-01 18:00", 21_600_000_000_000.0),
+        ] {
+            assert_eq!(date(unit, "standard", number), "2020-01-02 0", "{unit}");
         }
     }
 

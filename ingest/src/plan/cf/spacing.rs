@@ -153,6 +153,25 @@ fn times(stamps: &[CalendarDate]) -> Option<Vec<i64>> {
     stamps.iter().map(|s| s.count_ms()).collect()
 }
 
+/// Why the distance of stamps, which rise, does not tell how long steps are, with the first place where it does not.
+pub(crate) fn untold(stamps: &[CalendarDate]) -> String {
+    let advice = "say in a profile what a step covers";
+    let times = times(stamps).unwrap_or_default();
+    let distances: Vec<i64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let is_odd = |distance: &i64| Some(distance) != distances.first();
+    match distances.iter().position(is_odd) {
+        Some(at) => format!(
+            "has stamps at uneven distances: {} and {} are the first two, and {} and {} are at the indexes {at} and {}; {advice}",
+            stamps[0],
+            stamps[1],
+            stamps[at],
+            stamps[at + 1],
+            at + 1
+        ),
+        None => format!("has stamps whose distance is no length of steps that is known; {advice}"),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -252,7 +271,7 @@ mod tests {
                 "2001-01-01T09:00:00Z/2001-01-01T15:00:00Z"
             ]
         );
-        assert!(around(&stamps[..1]).is_err());
+        assert!(around(&stamps[..1]).unwrap_err().contains("fewer than two"));
     }
 
     /// Distances are those of the calendar of the file: 28 February and 1 March follow each other in one without leap days.
@@ -287,5 +306,16 @@ mod tests {
             &[(2001, 7, 1), (2002, 7, 1), (2003, 7, 1)],
         );
         assert_eq!(of(&years).unwrap().covers, Covers::Year);
+    }
+
+    #[test]
+    fn uneven_distances_are_told_with_their_places() {
+        let day = |day| stamp(2001, 1, day, 0.0);
+        let stamps = [day(1), day(2), day(5)];
+        assert_eq!(told(&stamps), None);
+        let uneven = untold(&stamps);
+        for part in ["uneven", "2001-01-05", "the indexes 1 and 2"] {
+            assert!(uneven.contains(part), "{part}: {uneven}");
+        }
     }
 }
