@@ -35,6 +35,19 @@ def acf(values, lag):
     return float((z[: len(z) - lag] * z[lag:]).sum() / (z * z).sum())
 
 
+def corrected(values, slope):
+    """What the variance of Mann and Kendall's score is multiplied with (Hamed and Rao 1998, equation 16), z and p where that is more."""
+    n = len(values)
+    left = stats.rankdata(values - slope * np.arange(n))
+    r = acf(left, 1)
+    lags = np.arange(1, n)
+    weights = (n - lags) * (n - lags - 1) * (n - lags - 2)
+    correction = 1 + 2 / (n * (n - 1) * (n - 2)) * (weights * r**lags).sum() if abs(r) > stats.norm.ppf(0.975) / np.sqrt(n) else 1.0
+    found = pymannkendall.original_test(values)
+    z = (found.s - np.sign(found.s)) / np.sqrt(found.var_s * max(correction, 1))
+    return r, correction, z, 2 * stats.norm.sf(abs(z))
+
+
 def least_squares(x, y):
     fit = stats.linregress(x, y)
     left = y - fit.intercept - fit.slope * x
@@ -122,12 +135,11 @@ found = stats.theilslopes(SERIES[gaps], x[gaps])
 print("theil-sen with gaps", found.slope, found.low_slope, found.high_slope)
 found = pymannkendall.original_test(SERIES)
 print("mann-kendall", found.s, found.Tau, found.var_s, found.z, found.p)
-found = pymannkendall.hamed_rao_modification_test(SERIES)
-print("hamed-rao", found.s, found.var_s, found.z, found.p, found.slope)
-print("correction", found.var_s / pymannkendall.original_test(SERIES).var_s)
-found = pymannkendall.hamed_rao_modification_test(SLOW)
-print("hamed-rao slow", found.s, found.var_s, found.z, found.p, found.slope)
-print("correction slow", found.var_s / pymannkendall.original_test(SLOW).var_s)
+for name, series in ("series", SERIES), ("slow", SLOW):
+    # What values keep from step to step, and its powers, in the place of what is found at each lag.
+    found = pymannkendall.hamed_rao_modification_test(series)
+    print("hamed-rao", name, found.s, found.var_s, found.z, found.p, found.slope)
+    print("corrected", name, *corrected(series, found.slope))
 waves()
 for lag in (-3, 0, 1, 2):
     print("lag", lag, *lagged(SERIES, OTHER, lag))

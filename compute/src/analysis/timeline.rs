@@ -33,13 +33,13 @@ pub fn middles_years(periods: &[Period]) -> Vec<f64> {
 pub fn means_over(periods: &[Period], values: &[f64], step: TimeStep) -> (Vec<Period>, Vec<f64>) {
     let bins = Bins::over(periods, step);
     let means = bins.means(values);
-    (bins.bins, means)
+    (bins.periods, means)
 }
 
 /// How steps lie in bins of the calendar: found once for all series over the same steps.
 #[derive(Debug)]
 pub struct Bins {
-    bins: Vec<Period>,
+    periods: Vec<Period>,
     steps: Steps,
     /// That of [`least_share`].
     least_share: f64,
@@ -62,7 +62,7 @@ impl Bins {
         if step == TimeStep::Native {
             let line = Line::of(periods).unwrap_or_else(|| Line::as_they_are(periods));
             return Self {
-                bins: line.steps.clone(),
+                periods: line.steps.clone(),
                 steps: Steps::Native(line),
                 least_share: least_share(step),
             };
@@ -84,7 +84,7 @@ impl Bins {
         }
         let steps = Steps::Inside(inside);
         Self {
-            bins,
+            periods: bins,
             steps,
             least_share: least_share(step),
         }
@@ -92,7 +92,7 @@ impl Bins {
 
     /// The bins.
     pub fn periods(&self) -> &[Period] {
-        &self.bins
+        &self.periods
     }
 
     /// Of each bin the first step that reaches into it, and how many seconds of that and of each one after it lie in it; nothing
@@ -102,7 +102,7 @@ impl Bins {
             Steps::Native(_) => &[],
             Steps::Inside(inside) => inside,
         };
-        let bins = self.bins.iter().zip(inside);
+        let bins = self.periods.iter().zip(inside);
         bins.map(|(bin, (from, shared_s))| (*bin, *from, &shared_s[..]))
     }
 
@@ -124,7 +124,7 @@ impl Bins {
             let is_held = with_data_s >= self.least_share * bin.seconds();
             if is_held { sum / with_data_s } else { f64::NAN }
         };
-        self.bins.iter().zip(inside).map(mean).collect()
+        self.periods.iter().zip(inside).map(mean).collect()
     }
 }
 

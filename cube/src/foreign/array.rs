@@ -125,6 +125,12 @@ impl ForeignArray {
         state::elsewhere(self.session.as_deref()?, &self.name, index).await
     }
 
+    /// Values that it has, 1 without dimensions; none beyond what can be counted.
+    pub fn cell_count(&self) -> Option<u64> {
+        let mut lengths = self.dimensions.iter().map(|(_, length)| *length);
+        lengths.try_fold(1, u64::checked_mul)
+    }
+
     /// Bytes of one value.
     ///
     /// # Errors

@@ -1,8 +1,8 @@
 //! Arrays of a store of others in, what they say as a file says it, and their values.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
@@ -30,6 +30,12 @@ pub(crate) struct Arrays {
     /// The array that is asked for, and what its chunks mean that are not there.
     absent: (String, Absent),
     plane_cells: u64,
+    /// What is said of coordinates that were not written.
+    unwritten: Arc<Mutex<BTreeSet<String>>>,
+}
+
+fn lock<T>(held: &Mutex<T>) -> MutexGuard<'_, T> {
+    held.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl Arrays {
@@ -45,6 +51,7 @@ impl Arrays {
             indexes,
             absent,
             plane_cells,
+            unwritten: Arc::default(),
         }
     }
 
@@ -73,13 +80,30 @@ impl Arrays {
     ) -> Result<Vec<f64>, ForeignError> {
         let array = self.foreign.array(variable)?;
         let ranges = Self::ranges(array, &self.indexes, part);
+        if self.absent.0 == variable {
+            return self.foreign.read(variable, &ranges, self.absent.1).await;
+        }
         // What else is read of a store are coordinates and their bounds.
-        let absent = if self.absent.0 == variable {
-            self.absent.1
-        } else {
-            Absent::RefusedOfCoordinate
+        let absent = Absent::RefusedOfCoordinate;
+        let refused = match self.foreign.read(variable, &ranges, absent).await {
+            Err(refused) if array.cell_count() == Some(1) => refused,
+            read => return read,
         };
-        self.foreign.read(variable, &ranges, absent).await
+        // The time of a store of one step is 0 since itself, as most programs write it, and what is fill value is not written.
+        let Some(fill) = array.fill.filter(|fill| fill.is_finite()) else {
+            return Err(refused);
+        };
+        let read = self.foreign.read(variable, &ranges, Absent::Fill).await?;
+        let said = format!(
+            "{variable}: its one value is not there and is taken for the fill value, {fill}, which is not written"
+        );
+        lock(&self.unwritten).insert(said);
+        Ok(read)
+    }
+
+    /// What was taken for granted of coordinates that were read.
+    pub(crate) fn assumptions(&self) -> Vec<String> {
+        lock(&self.unwritten).iter().cloned().collect()
     }
 
     /// A part as ranges along all dimensions of an array.

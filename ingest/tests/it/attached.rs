@@ -573,6 +573,26 @@ async fn a_time_of_zero_that_was_not_written_is_refused_with_what_to_do() {
     }
 }
 
+/// As programs write a store of one step: its time is 0 since itself, which is the fill value.
+#[tokio::test]
+async fn the_one_time_of_a_store_that_was_not_written_is_zero_and_told() {
+    let own = Own::with("v3-gzip.zarr");
+    for array in ["time", "time_bnds", "sst"] {
+        own.edit(&format!("{array}/zarr.json"), |it| {
+            it["shape"][0] = json!(1);
+        });
+    }
+    std::fs::remove_file(own.path().join("time/c/0")).unwrap();
+    let attached = own.attach().await.unwrap();
+    assert_eq!(attached.steps, 1);
+    let told = "time: its one value is not there and is taken for the fill value, 0";
+    assert!(
+        attached.assumptions.iter().any(|own| own.contains(told)),
+        "{:?}",
+        attached.assumptions
+    );
+}
+
 #[tokio::test]
 async fn a_group_without_arrays_says_which_groups_it_has() {
     for (name, document, content) in [

@@ -71,6 +71,39 @@ fn steps_of_any_length_give_the_wave_that_made_them() {
     near(cosine.hypot(sine), 0.988_2, 1e-3);
 }
 
+/// Of what lies in a part of the year alone, every year the same, noise makes any amplitude.
+#[test]
+fn a_season_of_a_part_of_the_year_is_none() {
+    let all: Vec<Period> = (0..120)
+        .map(|m| Period::month(2001 + m / 12, (m % 12) as u32 + 1).unwrap())
+        .collect();
+    let of_months = |held: std::ops::Range<usize>| {
+        let value = |m: usize| {
+            let wave = 0.5 * ((m % 12) as f64 / 12.0 * std::f64::consts::TAU).cos();
+            if held.contains(&(m % 12)) {
+                wave + ((m * m) % 7) as f64 * 0.05
+            } else {
+                f64::NAN
+            }
+        };
+        (0..120).map(value).collect::<Vec<f64>>()
+    };
+    for held in [0..4, 3..9, 2..9, 2..10] {
+        let why = season(&all, &of_months(held)).unwrap_err().to_string();
+        assert!(why.contains("too few parts of the year"), "{why}");
+    }
+    // Winters alone, over New Year.
+    let mut winters = of_months(0..12);
+    for m in (0..120).filter(|m| (4..9).contains(&(m % 12))) {
+        winters[m] = f64::NAN;
+    }
+    assert!(season(&all, &winters).is_err());
+    for held in [0..12, 0..9, 3..12] {
+        let amplitude = season(&all, &of_months(held)).unwrap().annual.amplitude;
+        assert!((amplitude - 0.5).abs() < 0.1, "{amplitude}");
+    }
+}
+
 #[test]
 fn what_has_no_season_is_refused_with_the_reason() {
     let (periods, values) = months();
