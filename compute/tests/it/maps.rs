@@ -430,6 +430,52 @@ fn of(statistic: MapStatistic, region: Option<&str>, name: &str) -> MapOptions {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn steps_that_never_landed_are_time_without_data() {
+    let (_folder, store) = folder_store();
+    let winters = steps()
+        .into_iter()
+        .enumerate()
+        .filter(|(m, _)| m % 12 < 4)
+        .map(|(_, step)| step);
+    let winters: Vec<(Period, Vec<f32>)> = winters.collect();
+    let name = product("wind");
+    land(&store, &name, Quantity::WindSpeed, GRID, &winters).await;
+    let engine = Engine::in_process(store.clone(), parts(2));
+    let made = derived(&engine, &MapOptions::new(MapStatistic::Coverage)).await;
+    let coverage = read(&store, &made.unwrap(), 0).await[at(4, 0)];
+    let held_s: f64 = winters.iter().map(|(period, _)| period.seconds()).sum();
+    let all = Period::new(winters[0].0.start, winters[11].0.end).unwrap();
+    let expected = 100.0 * held_s / all.seconds();
+    assert!(
+        (f64::from(coverage) - expected).abs() < 1e-4 && expected < 50.0,
+        "{coverage} {expected}"
+    );
+    let none = "no cell holds data in as much of the time as is asked for";
+    let mean = MapOptions::new(MapStatistic::Mean);
+    let refused = derived(&engine, &mean).await.unwrap_err().to_string();
+    assert!(refused.contains(none), "{refused}");
+    let least_percent = 40;
+    let some = MapOptions {
+        least_percent,
+        ..mean
+    };
+    assert!(derived(&engine, &some).await.is_ok());
+    // Of a climatology each month is asked for by itself: of those that there are, and of those of a base period.
+    let normals = MapOptions::new(MapStatistic::Climatology);
+    let made = derived(&engine, &normals).await.unwrap();
+    assert!(!read(&store, &made, 0).await[at(4, 0)].is_nan());
+    assert!(read(&store, &made, 5).await[at(4, 0)].is_nan());
+    for (base, is_enough) in [("2001/2006", true), ("2001/2007", false)] {
+        let of_base = MapOptions {
+            base: Some(base.parse().unwrap()),
+            ..normals.clone()
+        };
+        let made = derived(&engine, &of_base).await;
+        assert_eq!(made.is_ok(), is_enough, "{base}: {made:?}");
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn another_statistic_does_not_take_the_place_of_one() {
     let (_folder, store) = folder_store();
     landed(&store).await;
