@@ -71,6 +71,9 @@ impl StatisticsQuery {
     }
 }
 
+/// Rounding of areas and times that make a coverage, percent.
+const SLACK_PERCENT: f64 = 1e-6;
+
 /// Least coverage of a row that has values, percent, 0 to 100.
 #[derive(Debug, Clone, Copy, Default, PartialEq, PartialOrd, Serialize)]
 #[serde(transparent)]
@@ -92,6 +95,11 @@ impl MinCoverage {
     /// It in percent.
     pub fn percent(self) -> f64 {
         self.0
+    }
+
+    /// Is so much covered? What is a quotient of sums may be a hair below all.
+    pub fn is_met(self, percent: f64) -> bool {
+        percent >= self.0 - SLACK_PERCENT
     }
 }
 

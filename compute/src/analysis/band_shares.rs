@@ -13,9 +13,9 @@ use crate::region::loaded::RegionWeights;
 /// Share of a cell that two gaps between columns must differ by to be told apart: widths are sums.
 const GAP_SLACK: f64 = 1e-3;
 
-/// Share of a cell from which on it is one of a region's: corners of regions of many parts are rounded to some 10⁻⁷ degrees, so that
-/// edges along those of cells leave slivers on the other side, of which a band would have a mean.
-const SLIVER: f64 = 1e-5;
+/// What corners of regions of many parts are rounded to, degrees, and more than that: edges along those of cells leave slivers so wide on the other side,
+/// of which a band would have a mean.
+const SLIVER_DEG: f64 = 3e-7;
 
 /// What counts of a cell.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -54,7 +54,8 @@ impl BandShares {
         whole: Arc<RegionWeights>,
         sea: Arc<RegionWeights>,
     ) -> Self {
-        let least_m2 = (0..grid.rows).map(|row| SLIVER * grid.cell_area_m2(row, earth));
+        let sliver = SLIVER_DEG / grid.dlat_deg.min(grid.dlon_deg);
+        let least_m2 = (0..grid.rows).map(|row| sliver * grid.cell_area_m2(row, earth));
         let mut own = Self {
             grid: *grid,
             whole,

@@ -10,14 +10,9 @@ use contract::region::Region;
 
 use super::band_shares::BandShares;
 use super::bands::{BandAreas, Bands};
-use crate::budget::over_region::{AskedArea, extent_of, weights};
+use crate::budget::over_region::{AskedArea, beside_grid, extent_of, weights};
 use crate::region::loaded::weights_failed;
 use crate::{ComputeError, Engine};
-
-/// Share of a region that a grid must lack before a reader is told.
-const OUTSIDE_SHARE: f64 = 1e-6;
-/// Square metres in a million square kilometres.
-const M2_PER_MILLION_KM2: f64 = 1e12;
 
 /// Bands over a box or polygons.
 pub(super) struct Banded {
@@ -28,8 +23,8 @@ pub(super) struct Banded {
     pub(super) region: Option<String>,
     /// How the region was taken.
     notes: Vec<String>,
-    /// Area of the polygons, wherever the grid lies, m².
-    region_area_m2: f64,
+    /// Area of the polygons, wherever the grid lies, and on the grid, m².
+    areas_m2: [f64; 2],
 }
 
 impl Banded {
@@ -65,7 +60,7 @@ impl Banded {
             bounds_deg,
             region: None,
             notes: vec![],
-            region_area_m2: 0.0,
+            areas_m2: [0.0; 2],
         })
     }
 
@@ -93,6 +88,7 @@ impl Banded {
         )
         .map_err(weights_failed)?;
         let grid = &manifest.grid;
+        let on_grid_m2: f64 = whole.chunks().flat_map(|(_, areas_m2)| areas_m2).sum();
         let shares = BandShares::new((grid, query.earth), whole, sea);
         let touched = shares
             .touched()
@@ -107,7 +103,7 @@ impl Banded {
             bounds_deg,
             region: query.region.as_ref().map(|asked| asked.name.clone()),
             notes: extent.notes,
-            region_area_m2: extent.area_m2,
+            areas_m2: [extent.area_m2, on_grid_m2],
         })
     }
 
@@ -145,14 +141,11 @@ impl Banded {
     pub(super) fn notes(&self, areas: &[BandAreas], more: Option<String>) -> Vec<String> {
         let mut notes = self.notes.clone();
         if self.region.is_some() {
-            let on_grid_m2: f64 = areas.iter().map(|own| own.all_m2).sum();
-            if on_grid_m2 < self.region_area_m2 * (1.0 - OUTSIDE_SHARE) {
-                notes.push(format!(
-                    "of the region's {:.6} million km² {:.6} lie on the grid: coverage is a share of the sea in these",
-                    self.region_area_m2 / M2_PER_MILLION_KM2,
-                    on_grid_m2 / M2_PER_MILLION_KM2
-                ));
-            }
+            let [area_m2, on_grid_m2] = self.areas_m2;
+            let beside = beside_grid(area_m2, on_grid_m2);
+            notes.extend(
+                beside.map(|beside| format!("{beside}: coverage is a share of the sea in these")),
+            );
             let untouched = areas.iter().filter(|own| own.all_m2 <= 0.0).count();
             if untouched > 0 {
                 notes.push(format!(

@@ -125,7 +125,7 @@ struct Rows {
 
 impl Rows {
     fn row(&mut self, bin: Period, sums: &[BandSum]) -> HovmollerRow {
-        let (display, least) = (self.display, self.least.percent());
+        let (display, least) = (self.display, self.least);
         let coverage_percent = |(sum, area_m2): (&BandSum, &f64)| {
             let all = area_m2 * bin.seconds();
             if all > 0.0 {
@@ -136,7 +136,8 @@ impl Rows {
         };
         let covered = sums.iter().zip(&self.covered_m2);
         let coverage_percent: Vec<f64> = covered.map(coverage_percent).collect();
-        let is_kept = |(sum, percent): (&BandSum, &f64)| sum.area_m2 > 0.0 && *percent >= least;
+        let is_kept =
+            |(sum, percent): (&BandSum, &f64)| sum.area_m2 > 0.0 && least.is_met(*percent);
         let kept: Vec<bool> = sums.iter().zip(&coverage_percent).map(is_kept).collect();
         let with_data = sums.iter().filter(|sum| sum.area_m2 > 0.0).count();
         let kept_count = kept.iter().filter(|is_kept| **is_kept).count();

@@ -151,7 +151,7 @@ mod tests {
         }
         assert!((25..80).contains(&found), "{found} of 1000");
         assert!((told / squares - 1.0).abs() < 0.2, "{told} {squares}");
-        // Of thirteen values less twelve means nothing is left that tells a spread of two.
+        // Of twelve values less twelve means nothing is left that tells a spread.
         let few = months(12);
         let values: Vec<f64> = (0..12).map(f64::from).collect();
         assert_eq!(mean_over_time(&few, &values, (&values, 12)).variance, None);

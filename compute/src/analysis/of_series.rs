@@ -8,6 +8,7 @@ use super::climatology::{anomalies, climatology};
 use super::extremes::extremes;
 use super::harmonics::season;
 use super::read::{self, ReadSeries, Version};
+use super::timeline::{left_out, no_shorter};
 use super::trend::trend;
 use super::undefined::Undefined;
 use crate::{ComputeError, Engine};
@@ -40,7 +41,7 @@ fn made_of(read: ReadSeries, options: &AnalysisOptions) -> SeriesAnalysis {
         place,
         periods,
         values,
-        left_out,
+        left_out: left_out_count,
         notes,
     } = read;
     let mut answer = SeriesAnalysis {
@@ -49,7 +50,7 @@ fn made_of(read: ReadSeries, options: &AnalysisOptions) -> SeriesAnalysis {
         step_count: periods.len() as u64,
         value_count,
         min_coverage_percent: options.min_coverage.percent(),
-        left_out_count: left_out as u64,
+        left_out_count: left_out_count as u64,
         notes,
         refused: vec![],
         climatology: None,
@@ -66,8 +67,12 @@ fn made_of(read: ReadSeries, options: &AnalysisOptions) -> SeriesAnalysis {
                 .map(|made| answer.climatology = Some(made)),
             AnalysisPart::Anomaly => climatology(&periods, &values, options.bins, options.base)
                 .map(|normal| answer.anomaly = Some(anomalies(&periods, &values, &normal))),
-            AnalysisPart::Trend => trend(&periods, &values, options.trend_step, &answer.cited.unit)
-                .map(|made| answer.trend = Some(made)),
+            AnalysisPart::Trend => {
+                let step = no_shorter(&periods, options.trend_step);
+                answer.notes.extend(left_out(&periods, &values, step));
+                trend(&periods, &values, step, &answer.cited.unit)
+                    .map(|made| answer.trend = Some(made))
+            }
             AnalysisPart::Season => {
                 season(&periods, &values).map(|made| answer.season = Some(made))
             }

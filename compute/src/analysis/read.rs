@@ -51,7 +51,7 @@ impl ReadSeries {
     fn take_means(&mut self, series: &[CoveredMean], least: MinCoverage, of_what: &str) {
         let (all, mut little) = (series.len(), 0);
         for step in series {
-            let is_out = step.mean.is_some() && step.coverage_percent < least.percent();
+            let is_out = step.mean.is_some() && !least.is_met(step.coverage_percent);
             let mean = step.mean.filter(|_mean| !is_out);
             self.periods.push(step.period);
             self.values.push(mean.unwrap_or(f64::NAN));

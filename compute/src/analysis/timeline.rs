@@ -128,6 +128,27 @@ impl Bins {
     }
 }
 
+/// What is to be said of bins that hold data, and too little of it for a mean; nothing of steps that are taken as they are.
+pub fn left_out(periods: &[Period], values: &[f64], step: TimeStep) -> Option<String> {
+    let bins = Bins::over(periods, step);
+    let means = bins.means(values);
+    let held = bins.shares().zip(&means).filter(|((_, from, shares), _)| {
+        let own = &values[*from..][..shares.len()];
+        own.iter().any(|value| !value.is_nan())
+    });
+    let (mut all, mut left_out) = (0, 0);
+    for (_bin, mean) in held {
+        all += 1;
+        left_out += usize::from(mean.is_nan());
+    }
+    (left_out > 0).then(|| {
+        format!(
+            "{left_out} of {all} means of step {step} hold data over less than {:.0} % of their time and are left out",
+            100.0 * least_share(step)
+        )
+    })
+}
+
 /// What steps may be gathered in: bins of the calendar that are no shorter than they are, else steps as they are.
 pub fn no_shorter(periods: &[Period], step: TimeStep) -> TimeStep {
     match step.longest_step_s() {

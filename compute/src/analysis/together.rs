@@ -17,7 +17,7 @@ use super::common_steps::{CommonSteps, Covered};
 use super::correlation::correlations;
 use super::mean_difference::{MeanOverTime, mean_over_time, welch};
 use super::read::{self, ReadSeries, Version};
-use super::timeline::{longest_s, means_over};
+use super::timeline::{left_out, longest_s, means_over};
 use crate::{ComputeError, Engine};
 
 /// Years from which the mean of a calendar month is more than its one value.
@@ -55,7 +55,11 @@ pub fn correlation<'a>(
                 let nearer = b.0.abs().cmp(&a.0.abs()).then(a.0.cmp(&b.0));
                 a.1.total_cmp(&b.1).then(nearer)
             });
-        let mut notes = notes_of([("first", &a.notes[..]), ("second", &b.notes[..])]);
+        let of_side = |side: &ReadSeries| {
+            let means = left_out(&side.periods, &side.values, query.step);
+            side.notes.iter().cloned().chain(means).collect::<Vec<_>>()
+        };
+        let mut notes = notes_of([("first", &of_side(&a)), ("second", &of_side(&b))]);
         let products = [&a.cited.product, &b.cited.product];
         notes.extend(of_undefined(&rows, products, query.deseasonalise));
         Ok(Correlation {
@@ -179,7 +183,19 @@ fn has_months(series: &ReadSeries) -> bool {
 /// Are there two years of months, so that what comes every year is told from what does not?
 fn has_seasons(series: &ReadSeries) -> bool {
     let months = means_over(&series.periods, &series.values, TimeStep::Month);
-    has_months(series) && months.0.len() >= SEASONS_FROM_MONTHS
+    // Each month's mean takes a value, and a spread needs two that are left.
+    let is_enough = series.value_count() > months_of_year(series) + 1;
+    has_months(series) && months.0.len() >= SEASONS_FROM_MONTHS && is_enough
+}
+
+/// Calendar months that hold data.
+fn months_of_year(series: &ReadSeries) -> usize {
+    let here = series.periods.iter().zip(&series.values);
+    let months = here.filter(|(_, value)| !value.is_nan());
+    let months: BTreeSet<usize> = months
+        .map(|(period, _)| CalendarBins::Month.of(*period))
+        .collect();
+    months.len()
 }
 
 /// Share of its time with data that each calendar month has.
@@ -212,7 +228,7 @@ fn of_seasons(sides: [(&ReadSeries, &MeanOverTime); 2]) -> Vec<String> {
     let is_short =
         |(series, mean): &(&ReadSeries, &MeanOverTime)| mean.count > 1 && !has_seasons(series);
     if sides.iter().any(is_short) {
-        notes.push("a side spans less than two years of months, so that its season cannot be told from chance: the standard error has it, and the p value tells nothing of what comes beside the season".to_owned());
+        notes.push("a side spans less than two years of months, or hardly more values than months, so that its season cannot be told from chance: the standard error has it, and the p value tells nothing of what comes beside the season".to_owned());
     }
     notes
 }
@@ -224,11 +240,7 @@ fn of_side(series: &ReadSeries) -> MeanOverTime {
         return mean_over_time(periods, values, (values, 1));
     }
     let about = deseasonalised(periods, values);
-    let here = periods.iter().zip(values).filter(|(_, v)| !v.is_nan());
-    let months: BTreeSet<usize> = here
-        .map(|(period, _)| CalendarBins::Month.of(*period))
-        .collect();
-    mean_over_time(periods, values, (&about, months.len()))
+    mean_over_time(periods, values, (&about, months_of_year(series)))
 }
 
 fn side(series: ReadSeries, mean: &MeanOverTime) -> DifferenceSide {

@@ -99,15 +99,22 @@ pub(crate) async fn extent_of(
     known.get_or_insert_async(&name, measured).await
 }
 
-/// The extent with the sea that a product says lies on its grid.
-pub(crate) fn with_shares(mut extent: Extent, on_grid_m2: f64, sea_m2: f64) -> Extent {
-    let area_m2 = extent.area_m2;
-    if on_grid_m2 < area_m2 * (1.0 - OUTSIDE_SHARE) {
-        extent.notes.push(format!(
-            "of the region's {:.6} million km² {:.6} lie on the grid, and nobody says how much of the rest is sea: it is \
-             left out of the sea asked for",
+/// What is to be said of a region of which a part lies beside the grid.
+pub(crate) fn beside_grid(area_m2: f64, on_grid_m2: f64) -> Option<String> {
+    (on_grid_m2 < area_m2 * (1.0 - OUTSIDE_SHARE)).then(|| {
+        format!(
+            "of the region's {:.6} million km² {:.6} lie on the grid",
             area_m2 / M2_PER_MILLION_KM2,
             on_grid_m2 / M2_PER_MILLION_KM2
+        )
+    })
+}
+
+/// The extent with the sea that a product says lies on its grid.
+pub(crate) fn with_shares(mut extent: Extent, on_grid_m2: f64, sea_m2: f64) -> Extent {
+    if let Some(beside) = beside_grid(extent.area_m2, on_grid_m2) {
+        extent.notes.push(format!(
+            "{beside}, and nobody says how much of the rest is sea: it is left out of the sea asked for"
         ));
     }
     extent.with_ocean(sea_m2)

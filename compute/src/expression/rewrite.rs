@@ -25,7 +25,9 @@ pub(super) fn numbers(expr: Expr) -> Result<Expr> {
                 Transformed::yes(with_unit(&call.args)?)
             }
             Expr::Negative(inner) => match *inner {
-                Expr::Literal(ScalarValue::Float64(Some(value)), metadata) => {
+                Expr::Literal(ScalarValue::Float64(Some(value)), metadata)
+                    if !counts_from_elsewhere(metadata.as_ref()) =>
+                {
                     Transformed::yes(Expr::Literal(ScalarValue::from(-value), metadata))
                 }
                 inner => Transformed::no(Expr::Negative(Box::new(inner))),
@@ -34,6 +36,11 @@ pub(super) fn numbers(expr: Expr) -> Result<Expr> {
         })
     };
     expr.transform_up(number).map(|done| done.data)
+}
+
+/// Is a number's unit one whose zero is no zero, so that its negative is none of the number that was written?
+pub(super) fn counts_from_elsewhere(metadata: Option<&FieldMetadata>) -> bool {
+    metadata.is_some_and(|metadata| metadata.inner().contains_key(OFFSET_KEY))
 }
 
 fn as_f64(value: ScalarValue) -> Result<ScalarValue> {

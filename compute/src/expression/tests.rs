@@ -82,6 +82,16 @@ fn functions_of_the_flux_are_those_of_the_papers_and_count_what_they_do_not_hold
     ];
     close(&found.values, &expected);
     assert_eq!(found.outside, BTreeMap::new());
+    // Beside temperatures degrees Celsius are one.
+    for celsius in [
+        "CASE WHEN sst > unit(6.85, 'degC') THEN 1 ELSE 0 END",
+        "CASE WHEN sst > unit(280, 'K') THEN 1 ELSE 0 END",
+    ] {
+        close(
+            &evaluate(celsius).values,
+            &evaluate("CASE WHEN sst > unit(280, 'K') THEN 1 ELSE 0 END").values,
+        );
+    }
     let cold = evaluate("schmidt_wanninkhof1992(sst - unit(20, 'K'))");
     assert_eq!(cold.outside["schmidt_wanninkhof1992"], 2);
     let constant = evaluate("wind * carbon_kg_per_mol()").values[0];
@@ -123,6 +133,16 @@ fn mixed_units_and_whatever_is_no_arithmetic_are_refused_with_the_reason() {
         ),
         ("sst * unit(2, 'degC')", "may be a temperature"),
         ("sst + -unit(2, 'degC')", "may be a temperature"),
+        ("coalesce(sst, -unit(1.8, 'degC'))", "may be a temperature"),
+        (
+            "sst - CASE WHEN ice > 0.5 THEN unit(0.17, 'degC') ELSE unit(0, 'K') END",
+            "may be a temperature",
+        ),
+        ("sst - least(sst, unit(2, 'degC'))", "may be a temperature"),
+        (
+            "CASE WHEN abs(sst - unit(280, 'K')) > unit(2, 'degC') THEN sst END",
+            "may be a temperature",
+        ),
         ("nobody * 2", "nobody"),
         ("sin(ice)", "the function sin is not one of"),
         ("ice % 2", "operator %"),

@@ -72,6 +72,7 @@ pub(super) fn typed(expr: &Expr, units: &Units) -> Result<Typed, String> {
         Expr::Between(between) => {
             let middle = typed(&between.expr, units)?;
             for edge in [&between.low, &between.high] {
+                refuse_offset_beside(edge, &between.expr)?;
                 middle.alike(typed(edge, units)?, || format!("{expr}"))?;
             }
             Ok(Typed::Truth)
@@ -91,16 +92,62 @@ pub(super) const UNIT_KEY: &str = "unit";
 pub(super) const OFFSET_KEY: &str = "offset";
 
 /// A number of degrees Celsius in arithmetic may be a temperature or a difference of two, which lie 273.15 K apart: it is
-/// one in comparisons and where a function takes a temperature, and nowhere else.
+/// one beside temperatures that it is compared with or chosen from, where a function takes one, and nowhere else.
 fn refuse_offset(expr: &Expr) -> Result<(), String> {
-    let Expr::Literal(_, Some(metadata)) = expr else {
-        return Ok(());
-    };
-    match metadata.inner().get(OFFSET_KEY) {
+    match offset_in(expr) {
         Some(written) => Err(format!(
             "{written} in arithmetic may be a temperature or a difference of two: write it in K, as unit(0.17, 'K') for a difference"
         )),
         None => Ok(()),
+    }
+}
+
+/// A number of degrees Celsius that an expression may come to, as it was written.
+fn offset_in(expr: &Expr) -> Option<&String> {
+    match expr {
+        Expr::Literal(_, Some(metadata)) => metadata.inner().get(OFFSET_KEY),
+        Expr::Negative(inner) => offset_in(inner),
+        Expr::Case(case) => {
+            let branches = case.when_then_expr.iter().map(|(_, then)| then);
+            branches
+                .chain(&case.else_expr)
+                .find_map(|then| offset_in(then))
+        }
+        Expr::ScalarFunction(call) if Function::named(call.func.name()).is_none() => {
+            call.args.iter().find_map(offset_in)
+        }
+        _ => None,
+    }
+}
+
+/// Beside what is taken off from something else such a number may be either, too.
+fn refuse_offset_beside(expr: &Expr, other: &Expr) -> Result<(), String> {
+    if is_difference(other) {
+        refuse_offset(expr)
+    } else {
+        Ok(())
+    }
+}
+
+/// Is anything taken off from something else?
+fn is_difference(expr: &Expr) -> bool {
+    match expr {
+        Expr::BinaryExpr(binary) => {
+            binary.op == Operator::Minus
+                || (binary.op == Operator::Plus
+                    && (is_difference(&binary.left) || is_difference(&binary.right)))
+        }
+        Expr::Negative(inner) => is_difference(inner),
+        Expr::Case(case) => {
+            let branches = case.when_then_expr.iter().map(|(_, then)| then);
+            branches
+                .chain(&case.else_expr)
+                .any(|then| is_difference(then))
+        }
+        Expr::ScalarFunction(call) if Function::named(call.func.name()).is_none() => {
+            call.args.iter().any(is_difference)
+        }
+        _ => false,
     }
 }
 
@@ -150,6 +197,8 @@ fn of_binary(binary: &BinaryExpr, units: &Units) -> Result<Typed, String> {
         | Operator::GtEq
         | Operator::Eq
         | Operator::NotEq => {
+            refuse_offset_beside(&binary.left, &binary.right)?;
+            refuse_offset_beside(&binary.right, &binary.left)?;
             let (left, right) = sides()?;
             left.alike(right, whole).map(|_unit| Typed::Truth)
         }

@@ -288,7 +288,7 @@ impl Rows<'_> {
     fn row(&self, at: usize, bin: &BinSums) -> StatisticsRow {
         let coverage_percent = self.coverage_percent(bin);
         let has_data = bin.sums.count > 0;
-        let is_withheld = has_data && coverage_percent < self.query.min_coverage.percent();
+        let is_withheld = has_data && !self.query.min_coverage.is_met(coverage_percent);
         let value = |statistic: Statistic| match statistic {
             Statistic::Count => Some(bin.sums.count as f64),
             Statistic::Coverage => Some(coverage_percent),

@@ -5,7 +5,10 @@ use utoipa::ToSchema;
 
 use crate::time::{TimeMs, TimeStep};
 
-/// Trends of a series. Where steps are shorter than a year, the mean of each calendar month, or season, is taken off first, so that a
+/// A month and a day, ms.
+const LONGEST_MONTH_MS: i64 = 32 * 86_400_000;
+
+/// Trends of a series. Where steps are no longer than months, or as long as seasons, the mean of each calendar month, or season, is taken off first, so that a
 /// season that begins or ends early is no trend.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Trend {
@@ -31,6 +34,17 @@ pub struct Trend {
     pub mann_kendall: MannKendall,
     /// What the lines are drawn through, seasons taken off about the mean where they are; steps without data are absent.
     pub values: Vec<TrendValue>,
+}
+
+impl Trend {
+    /// What the means are of that were taken off first; none where values are as they are.
+    pub fn parts_taken_off(&self) -> Option<&'static str> {
+        let step = self.values.first();
+        let length_ms = step.map_or(0, |step| step.end.ms() - step.start.ms());
+        let is_month = length_ms <= LONGEST_MONTH_MS;
+        self.deseasonalised
+            .then_some(if is_month { "calendar month" } else { "season" })
+    }
 }
 
 /// A value that a trend is drawn through.

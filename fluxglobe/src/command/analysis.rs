@@ -44,12 +44,9 @@ pub(crate) async fn of_series(
     }
     let tables = tables::of_analysis(&answer);
     if tables.is_empty() {
-        let reasons: Vec<String> = answer
-            .refused
-            .iter()
-            .map(|one| one.reason.clone())
-            .collect();
-        bail!("{}", reasons.join("; "));
+        let reasons = answer.refused.iter().map(|one| &one.reason);
+        let all: Vec<&str> = reasons.chain(&answer.notes).map(String::as_str).collect();
+        bail!("{}", all.join("; "));
     }
     progress::result(&tables.join("\n\n"))?;
     for refused in &answer.refused {
@@ -107,7 +104,11 @@ pub(crate) async fn hovmoller(settings: &Settings, options: &StatsHovmoller) -> 
         answer.band_deg,
         answer.earth
     );
-    say_source(&answer.cited, &bands, "a hole is a band without data");
+    let holes = match answer.left_out_count {
+        0 => "a hole is a band without data",
+        _ => "a hole is a band without data, or with too little",
+    };
+    say_source(&answer.cited, &bands, holes);
     for note in &answer.notes {
         progress::say(&format!("note: {note}"));
     }

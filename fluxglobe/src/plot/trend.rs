@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use contract::analysis::{SeriesAnalysis, Trend};
-use contract::time::{TimeMs, TimeStep};
+use contract::time::TimeMs;
 use plotters::prelude::{Color as _, LineSeries, PathElement, Polygon, RGBColor};
 
 use super::chart::{Point, axis_of, below_legend, chart, label, legend, lines, period, place};
@@ -18,13 +18,9 @@ pub(super) fn of_trend(answer: &SeriesAnalysis) -> Result<String> {
     let below = format!(
         "through values of step {}{}; bands are the 95 % intervals of the slopes",
         trend.step,
-        if trend.deseasonalised {
-            match trend.step {
-                TimeStep::Season => ", the mean of each season taken off",
-                _ => ", the mean of each calendar month taken off",
-            }
-        } else {
-            ""
+        match trend.parts_taken_off() {
+            Some(part) => format!(", the mean of each {part} taken off"),
+            None => String::new(),
         }
     );
     let words = Words::of(&answer.cited, &place(answer), below);

@@ -407,7 +407,8 @@ fn steps_of(plan: &Plan, periods: &[Period], bin_of: &[usize]) -> Vec<f64> {
         let wanted = base
             .years()
             .filter(|year| plan.parts.is_in_year(bin, *year));
-        *steps *= wanted.count() as f64 / years.len().max(1) as f64;
+        // In this order whole numbers stay whole.
+        *steps = *steps * wanted.count() as f64 / years.len().max(1) as f64;
     }
     steps_of
 }

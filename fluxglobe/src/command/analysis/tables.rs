@@ -6,7 +6,6 @@ use contract::analysis::{
     Anomalies, Climatology, Correlation, Difference, Extremes, Harmonic, Hovmoller, HovmollerRow,
     Season, SeriesAnalysis, SeriesPlace, Trend,
 };
-use contract::time::TimeStep;
 
 use crate::progress;
 
@@ -140,10 +139,9 @@ fn trend(made: &Trend, unit: &str) -> String {
             ),
         ],
     ];
-    let seasons = match made.step {
-        _ if !made.deseasonalised => "values as they are",
-        TimeStep::Season => "mean of each season taken off",
-        _ => "mean of each calendar month taken off",
+    let seasons = match made.parts_taken_off() {
+        None => "values as they are".to_owned(),
+        Some(part) => format!("mean of each {part} taken off"),
     };
     let header = [
         "trend",
