@@ -757,8 +757,8 @@ impl Inner {
     /// Takes the steps of a state of the cube that are the version's.
     fn take(&mut self, cube: Cube) {
         let (own, there) = (&self.manifest, cube.description());
-        let is_same_cells = (own.grid.rows, own.grid.cols, own.quantity)
-            == (there.grid.rows, there.grid.cols, there.quantity);
+        let is_same_cells = (own.grid.rows, own.grid.cols) == (there.grid.rows, there.grid.cols)
+            && own.quantity.is_same_kind(there.quantity);
         if there.product != own.product || !is_same_cells {
             return;
         }

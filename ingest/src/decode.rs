@@ -112,7 +112,12 @@ impl Conversion {
 
     /// Notes with a plan what was found in the bands that were turned so far.
     pub(crate) fn tell(&self, plan: &mut Plan) {
-        let said = self.0.whole.as_ref().and_then(WholeNumbers::said);
+        let said = self
+            .0
+            .whole
+            .as_ref()
+            .and_then(WholeNumbers::said)
+            .map(plan::line);
         if let Some(line) = said.filter(|line| !plan.assumptions.contains(line)) {
             plan.assumptions.push(line);
         }

@@ -125,7 +125,7 @@ impl OpenQuantity {
         name == "correlation" || name.ends_with("_anomaly") || name.ends_with("_trend")
     }
 
-    /// Is it the same but for title, range and what its codes mean?
+    /// Is it the same but for title, range, what its codes mean and whether its name is a standard name?
     pub fn is_same_kind(self, other: Self) -> bool {
         let (own, other) = (self.words(), other.words());
         own.name == other.name && own.unit == other.unit

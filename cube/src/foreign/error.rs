@@ -12,6 +12,8 @@ pub struct ForeignError {
     pub reason: String,
     /// Where that lies.
     pub cause: Cause,
+    /// Is it a chunk that is not there?
+    pub is_absent: bool,
 }
 
 impl ForeignError {
@@ -21,6 +23,7 @@ impl ForeignError {
             place: place.into(),
             reason: reason.into(),
             cause: Cause::Content,
+            is_absent: false,
         }
     }
 

@@ -80,7 +80,7 @@ fn ranges(foreign: &Foreign, survey: &Survey, step: PlannedStep) -> Result<Vec<R
     Ok(Arrays::ranges(array, &survey.indexes, &parts))
 }
 
-/// Is it read as it was, but for how many steps there are?
+/// Is it read as it was, but for how many steps there are, and what is said of the quantity?
 fn is_alike(before: &Attachment, now: &Attachment) -> bool {
     let alike = |attachment: &Attachment| {
         let mut reading = Reading::of(attachment).ok()?;
@@ -88,7 +88,14 @@ fn is_alike(before: &Attachment, now: &Attachment) -> bool {
         Some(reading)
     };
     (&before.store, before.kind, &before.array) == (&now.store, now.kind, &now.array)
-        && alike(before).is_some_and(|before| Some(before) == alike(now))
+        && alike(before).zip(alike(now)).is_some_and(|(before, now)| {
+            let is_same_kind = before.quantity.is_same_kind(now.quantity);
+            let before = Reading {
+                quantity: now.quantity,
+                ..before
+            };
+            is_same_kind && before == now
+        })
 }
 
 fn is_of(reference: &Reference, planned: &PlannedStep, attachment: Digest) -> bool {

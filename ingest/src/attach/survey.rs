@@ -84,7 +84,8 @@ impl Survey {
         let held = (Values::Arrays(values.clone()), &description);
         let mut plan = plan::plan(held, &file_name(&place), wish, limits).await?;
         plan.target.synthetic |= is_synthetic;
-        plan.assumptions.extend(values.assumptions());
+        plan.assumptions
+            .extend(values.assumptions().into_iter().map(plan::line));
         if plan.quality.is_some() {
             let detail = "asks by [quality] for a second array, which attached products are not read with; leave it out or land the files";
             return Err(Rejection::new(RejectReason::Values, "profile", detail).into());

@@ -32,10 +32,14 @@ impl WholeNumbers {
         let is_long = matches!(plan.variable.kind, Kind::Integer(4..) | Kind::Unsigned(4..));
         let stays = |step: &PlannedStep| is_identity(step.factor, step.offset);
         let (packing, quantity) = (&plan.packing, plan.target.quantity);
-        let stay = is_identity(packing.scale, packing.offset) && plan.steps.iter().all(stays);
-        (is_long && stay).then(|| Self {
+        let is_kept =
+            is_long && is_identity(packing.scale, packing.offset) && plan.steps.iter().all(stays);
+        // A count has the unit 1, and says so.
+        let is_count =
+            quantity.flags().is_empty() && plan.variable.attributes.text("units").is_some();
+        is_kept.then(|| Self {
             variable: plan.variable.name.clone(),
-            are_codes: matches!(quantity, Quantity::Open(_)) && quantity.unit() == "1",
+            are_codes: matches!(quantity, Quantity::Open(_)) && quantity.unit() == "1" && !is_count,
             is_rounded: AtomicBool::new(false),
         })
     }

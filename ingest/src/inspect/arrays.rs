@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use contract::event::RejectReason;
-use cube::foreign::{Absent, ArrayKind, Foreign, ForeignArray, ForeignError, as_stored};
+use cube::foreign::{Absent, ArrayKind, Foreign, ForeignArray, ForeignError};
 use serde_json::{Map, Value};
 
 use super::file::description::{
@@ -18,9 +18,6 @@ use crate::error::{IngestError, Rejection, Stop};
 
 /// Which index is read of dimensions beside time and the map, by their names.
 pub(crate) type Indexes = BTreeMap<String, u64>;
-
-/// Attributes that hold stored numbers which stand for no data.
-const FILLS: [&str; 2] = ["_FillValue", "missing_value"];
 
 /// Arrays that are read.
 #[derive(Clone)]
@@ -86,7 +83,7 @@ impl Arrays {
         // What else is read of a store are coordinates and their bounds.
         let absent = Absent::RefusedOfCoordinate;
         let refused = match self.foreign.read(variable, &ranges, absent).await {
-            Err(refused) if array.cell_count() == Some(1) => refused,
+            Err(refused) if refused.is_absent && array.cell_count() == Some(1) => refused,
             read => return read,
         };
         // The time of a store of one step is 0 since itself, as most programs write it, and what is fill value is not written.
@@ -178,13 +175,6 @@ fn variable(array: &ForeignArray, indexes: &Indexes) -> Variable {
         ArrayKind::Other => Kind::Other,
     };
     let mut attributes = attributes(&array.attributes, kind);
-    for name in FILLS {
-        if let Some(AttributeValue::Numbers { bits, .. }) = attributes.0.get_mut(name) {
-            for number in bits {
-                *number = as_stored(array.kind, number.number()).into();
-            }
-        }
-    }
     // Zarr version 2 has it where version 3 has a value for what was not written, which may be one like any other.
     if let (true, Some(fill)) = (array.is_zarr2, array.fill) {
         let fill = AttributeValue::Numbers {

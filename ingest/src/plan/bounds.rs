@@ -48,6 +48,12 @@ pub(super) async fn read(
     }
     let mut periods = Vec::with_capacity(dates.len());
     for ([start, end], stamp) in dates.into_iter().zip(stamps) {
+        // In the order of their axis, which may go backwards.
+        let (start, end) = if start.count_ms() > end.count_ms() {
+            (end, start)
+        } else {
+            (start, end)
+        };
         let period = period::between(start, end).map_err(|e| refused(&name, e))?;
         // On the count of their own calendar, for a stamp may be a day that the real one lacks.
         let is_within = start.count_ms() <= stamp.count_ms() && stamp.count_ms() <= end.count_ms();
@@ -126,30 +132,31 @@ async fn climatology(
 /// The stretch of one year that a climatological step is of, in the year in which it holds the stamp.
 fn within_year([start, end]: [CalendarDate; 2], stamp: CalendarDate) -> Result<Period, String> {
     let in_year = |date: CalendarDate, year: i32| {
+        let dated = CalendarDate { year, ..date };
+        if period::instant(dated).is_ok() {
+            return dated;
+        }
         // 29 February in a common year is the day after the 28th.
-        period::instant(CalendarDate { year, ..date }).or_else(|_no_day| {
-            period::instant(CalendarDate {
-                year,
-                month: 3,
-                day: 1,
-                ..date
-            })
-        })
+        CalendarDate {
+            month: 3,
+            day: 1,
+            ..dated
+        }
     };
     let place = |date: CalendarDate| (date.month, date.day, date.second);
     let turns = i32::from(place(end) <= place(start));
-    let of_year = |year: i32| {
-        let (from, to) = (in_year(start, year)?, in_year(end, year + turns)?);
-        Period::new(from, to).map_err(|e| e.to_string())
+    let of_year = |year: i32| [in_year(start, year), in_year(end, year + turns)];
+    // On the count of their own calendar, for a stamp may be a day that the real one lacks.
+    let holds_stamp = |[from, to]: &[CalendarDate; 2]| {
+        from.count_ms() <= stamp.count_ms() && stamp.count_ms() <= to.count_ms()
     };
-    let stamp_time = period::instant(stamp)?;
-    for year in [stamp.year, stamp.year - 1] {
-        let period = of_year(year)?;
-        if period.start <= stamp_time && stamp_time <= period.end {
-            return Ok(period);
-        }
-    }
-    of_year(stamp.year)
+    let [own, before] = [stamp.year, stamp.year - 1].map(of_year);
+    let [from, to] = if !holds_stamp(&own) && holds_stamp(&before) {
+        before
+    } else {
+        own
+    };
+    period::between(from, to)
 }
 
 #[cfg(test)]
@@ -165,6 +172,33 @@ mod tests {
             second: 0.0,
             calendar: Calendar::Standard,
         }
+    }
+
+    /// A stamp of a calendar of models may be no day of the real one; its step is one all the same.
+    #[test]
+    fn a_climatology_of_a_model_is_told_in_its_own_calendar() {
+        let of = |calendar, dates: [(i32, u32, u32); 3]| {
+            let dated = |(year, month, day)| CalendarDate {
+                calendar,
+                ..date(year, month, day)
+            };
+            let [start, end, stamp] = dates.map(dated);
+            within_year([start, end], stamp).unwrap().to_string()
+        };
+        assert_eq!(
+            of(
+                Calendar::Days360,
+                [(1961, 2, 1), (1990, 3, 1), (1990, 2, 30)]
+            ),
+            "1990-02-01T00:00:00Z/1990-03-01T00:00:00Z"
+        );
+        assert_eq!(
+            of(
+                Calendar::NoLeap,
+                [(1961, 2, 28), (1990, 3, 1), (2000, 2, 28)]
+            ),
+            "2000-02-28T00:00:00Z/2000-02-29T00:00:00Z"
+        );
     }
 
     #[test]

@@ -192,10 +192,15 @@ pub(crate) async fn plan(
     })
 }
 
+/// What is told of a file, in which text of it may stand, as one short line.
+pub(crate) fn line(text: impl AsRef<str>) -> String {
+    Rejection::new(RejectReason::Values, "", text).detail
+}
+
 impl Planning<'_> {
     /// Notes what is taken for granted; text of the file becomes one short line.
     fn assume(&mut self, text: impl AsRef<str>) {
-        let line = Rejection::new(RejectReason::Values, "", text).detail;
+        let line = line(text);
         if !self.assumptions.contains(&line) {
             self.assumptions.push(line);
         }

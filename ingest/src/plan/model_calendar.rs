@@ -45,8 +45,9 @@ fn told(calendar: Calendar, periods: &[Period]) -> String {
     let mut said = vec![format!(
         "is in the calendar {name}, {what}; its dates are taken for the real ones"
     )];
-    let other =
-        |period: &&Period| own_days(calendar, **period).is_some_and(|own| own != days(**period));
+    let other = |period: &&Period| {
+        own_days(calendar, **period).is_some_and(|own| (own - days(**period)).abs() > 1e-6)
+    };
     if let Some(first) = periods.iter().find(other) {
         let (real, own) = (days(*first), own_days(calendar, *first).unwrap_or_default());
         said.push(format!(
@@ -67,19 +68,23 @@ fn told(calendar: Calendar, periods: &[Period]) -> String {
     said.join("; ")
 }
 
-/// Whole days of a step that is longer than one.
-fn days(period: Period) -> i64 {
-    (period.end.ms() - period.start.ms()) / DAY_MS
+/// Days of a step.
+fn days(period: Period) -> f64 {
+    (period.end.ms() - period.start.ms()) as f64 / DAY_MS as f64
 }
 
 /// As many of the calendar; none of steps of at most a day, which keep their length.
-fn own_days(calendar: Calendar, period: Period) -> Option<i64> {
+fn own_days(calendar: Calendar, period: Period) -> Option<f64> {
     let number = |time: TimeMs| {
         let ((year, month), (_, day)) = (time.year_month(), time.month_day());
         calendar.day_number(year, month, day)
     };
     let is_long = period.end.ms() - period.start.ms() > DAY_MS;
-    let length = || Some(number(period.end)? - number(period.start)?);
+    let of_day = |time: TimeMs| time.ms().rem_euclid(DAY_MS) as f64 / DAY_MS as f64;
+    let length = || {
+        let days = number(period.end)? - number(period.start)?;
+        Some(days as f64 + of_day(period.end) - of_day(period.start))
+    };
     is_long.then(length).flatten()
 }
 

@@ -97,7 +97,9 @@ fn check_apart(periods: &[Period]) -> Result<(), Rejection> {
         format!("{} and {}", periods[first], periods[second])
     };
     let detail = format!(
-        "has steps that overlap, at the indexes {first} and {second} ({which}); leave one out, or say in a profile what a step covers"
+        "has steps that overlap, {} and {} of the file ({which}); leave one out, or say in a profile what a step covers",
+        first + 1,
+        second + 1
     );
     Err(refused("time", detail))
 }
@@ -186,7 +188,7 @@ async fn by_file(
         ));
         spacing::around(&stamps).map_err(|e| refused(&name, e))?
     } else {
-        by_spacing(planning, &name, &stamps)?
+        by_spacing(planning, &name, (&stamps, is_backwards))?
     };
     if is_backwards {
         periods.reverse();
@@ -273,7 +275,7 @@ fn in_reference_year(units: &str) -> Option<String> {
 fn by_spacing(
     planning: &mut Planning<'_>,
     name: &str,
-    stamps: &[CalendarDate],
+    (stamps, is_backwards): (&[CalendarDate], bool),
 ) -> Result<Vec<Period>, Rejection> {
     let stated = || {
         Some(spacing::Spacing {
@@ -287,7 +289,7 @@ fn by_spacing(
         covers,
         at,
         assumption,
-    } = spacing.ok_or_else(|| refused(name, spacing::untold(stamps)))?;
+    } = spacing.ok_or_else(|| refused(name, spacing::untold(stamps, is_backwards)))?;
     if let Some(assumption) = assumption {
         planning.assume(format!(
             "{name}: has no bounds; {assumption} (if they are not, say stamp = \"middle\" or \"end\" in a profile)"

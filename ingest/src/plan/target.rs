@@ -9,7 +9,7 @@ use crate::error::Rejection;
 use crate::inspect::file::description::{Description, Variable};
 use crate::plan::cf::main_variable::{self, listed};
 use crate::plan::cf::open;
-use crate::plan::cf::packing::Packing;
+use crate::plan::cf::packing::{self, Packing};
 use crate::plan::cf::quantity::{Named, directions, has_direction, of_standard_name};
 use crate::plan::profile::Profile;
 use crate::plan::unit::Substance;
@@ -215,7 +215,9 @@ pub(crate) fn packing(
 ) -> Result<Packing, Rejection> {
     let mut packing = Packing::of(variable);
     if let Some(rules) = profile.map(|p| &p.variable) {
-        packing.fills.extend(rules.fill_values.iter().flatten());
+        let fills = rules.fill_values.iter().flatten();
+        let fills = fills.map(|fill| packing::as_stored(variable.kind, *fill));
+        packing.fills.extend(fills);
         packing.scale = rules.scale_factor.unwrap_or(packing.scale);
         packing.offset = rules.add_offset.unwrap_or(packing.offset);
         if let Some([low, high]) = rules.valid_range {

@@ -193,7 +193,7 @@ async fn a_file_without_time_is_refused() {
         &place,
         "twice.nc",
         RejectReason::Time,
-        &["overlap", "indexes 0 and 1"],
+        &["overlap", "1 and 2 of the file"],
     )
     .await;
 }

@@ -258,14 +258,16 @@ impl TimeUnit {
                     .ok_or_else(bad);
             }
         };
-        let total_s = after_s + second;
-        let days = (total_s / DAY_S).floor();
+        // To whole milliseconds: a sum of parts of a day may end a hair before its midnight, and would name the day before.
+        let total_ms = ((after_s + second) * 1e3).round();
+        let day_ms = DAY_MS as f64;
+        let days = (total_ms / day_ms).floor();
         if !days.is_finite() || days.abs() > MAX_DAYS {
             return Err(bad());
         }
         let start = calendar.day_number(year, month, day).ok_or_else(bad)?;
         calendar
-            .date(start + days as i64, total_s - days * DAY_S)
+            .date(start + days as i64, (total_ms - days * day_ms) / 1e3)
             .ok_or_else(bad)
     }
 }
@@ -430,6 +432,25 @@ mod tests {
         ] {
             assert_eq!(date(unit, "standard", number), "2020-01-02 0", "{unit}");
         }
+    }
+
+    /// As a program that adds up hours writes them: the sum ends a hair before its midnights.
+    #[test]
+    fn a_sum_of_parts_of_a_day_names_the_day_that_begins() {
+        let (mut sum, mut below) = (0.0, 0);
+        for hour in 1..=24 * 400 {
+            sum += 1.0 / 24.0;
+            if hour % 24 == 0 {
+                let whole = f64::from(hour / 24);
+                below += u32::from(sum < whole);
+                let (own, exact) = (
+                    date("days since 2001-01-01", "standard", sum),
+                    date("days since 2001-01-01", "standard", whole),
+                );
+                assert_eq!(own, exact, "{sum}");
+            }
+        }
+        assert!(below > 0, "no sum lies below its midnight");
     }
 
     #[test]

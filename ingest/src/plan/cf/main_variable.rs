@@ -98,7 +98,7 @@ pub(crate) fn of(file: &Description) -> Result<Chosen<'_>, Rejection> {
         .collect();
     match (main.as_slice(), data.as_slice()) {
         ([only], _) => Ok((only, beside(only, &on_grid))),
-        ([], []) => match file.variables.iter().find(|v| is_unread(v)) {
+        ([], []) => match file.variables.iter().find(|v| is_of_other_type(v)) {
             Some(unread) => refused(format!("holds {}, which {NO_NUMBERS}", unread.name)),
             None => refused("holds no gridded variable; give a file with one".to_owned()),
         },
@@ -134,7 +134,7 @@ fn of_known<'a>(
 }
 
 /// Would it be a map, were its values of a type that is read?
-fn is_unread(variable: &Variable) -> bool {
+fn is_of_other_type(variable: &Variable) -> bool {
     variable.kind == Kind::Other && variable.dimensions.len() >= 2
 }
 

@@ -4,6 +4,7 @@
 //! and offset unpack to and wider than the stored one; then of values (NetCDF Users Guide, attribute conventions;
 //! CF 1.11, 2.5.1 and 8.1).
 
+use cube::foreign::ArrayKind;
 use serde::{Deserialize, Serialize};
 
 use crate::inspect::file::description::{Attributes, Kind, NumberBits, Variable};
@@ -105,6 +106,7 @@ impl Packing {
             .into_iter()
             .filter_map(|name| attributes.numbers(name))
             .flatten()
+            .map(|fill| as_stored(variable.kind, fill))
             .collect();
         if fills.is_empty() {
             fills.extend(default_fill(variable.kind));
@@ -215,6 +217,14 @@ impl Packing {
     }
 }
 
+/// A number as values of this kind have it: a fill value of more digits is the nearest one of theirs.
+pub(crate) fn as_stored(kind: Kind, number: f64) -> f64 {
+    match kind {
+        Kind::Float(2) => cube::foreign::as_stored(ArrayKind::Float(2), number),
+        _ => number,
+    }
+}
+
 /// Of which numbers a bound of the valid range speaks.
 fn speaks(variable: &Variable, name: &str, number: f64) -> Speaks {
     let attributes = &variable.attributes;
@@ -304,6 +314,15 @@ mod tests {
         ];
         attributes.extend_from_slice(range);
         Packing::of(&variable(SHORT, &attributes))
+    }
+
+    /// Halves are 8 apart there: -9999 is stored as -10000.
+    #[test]
+    fn a_fill_value_of_more_digits_than_values_have_is_the_nearest_of_theirs() {
+        let half = Kind::Float(2);
+        let packing = Packing::of(&variable(half, &[("_FillValue", DOUBLE, &[-9999.0])]));
+        assert!(packing.value(-10_000.0).is_nan());
+        assert!((packing.value(-9992.0) + 9992.0).abs() < 1e-9);
     }
 
     #[test]

@@ -136,7 +136,11 @@ fn time(ms: i64) -> Result<TimeMs, String> {
 
 /// The date so much later in its own calendar.
 fn later(date: CalendarDate, ms: i64) -> Result<CalendarDate, String> {
-    date.later(ms).ok_or_else(|| format!("{date} {TOO_FAR}"))
+    let why = || match date.count_ms() {
+        Some(_) => format!("{date} {TOO_FAR}"),
+        None => format!("{date} is no day of its calendar"),
+    };
+    date.later(ms).ok_or_else(why)
 }
 
 /// The date just before: the day before for a midnight.

@@ -153,20 +153,29 @@ fn times(stamps: &[CalendarDate]) -> Option<Vec<i64>> {
     stamps.iter().map(|s| s.count_ms()).collect()
 }
 
-/// Why the distance of stamps, which rise, does not tell how long steps are, with the first place where it does not.
-pub(crate) fn untold(stamps: &[CalendarDate]) -> String {
+/// Why the distance of stamps, which rise, does not tell how long steps are, with the first place where it does not; `is_backwards`: the file has them the
+/// other way round.
+pub(crate) fn untold(stamps: &[CalendarDate], is_backwards: bool) -> String {
     let advice = "say in a profile what a step covers";
     let times = times(stamps).unwrap_or_default();
     let distances: Vec<i64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let step = |at: usize| {
+        if is_backwards {
+            stamps.len() - at
+        } else {
+            at + 1
+        }
+    };
     let is_odd = |distance: &i64| Some(distance) != distances.first();
     match distances.iter().position(is_odd) {
         Some(at) => format!(
-            "has stamps at uneven distances: {} and {} are the first two, and {} and {} are at the indexes {at} and {}; {advice}",
+            "has stamps at uneven distances: {} and {} are the first two, and {} and {} are the steps {} and {} of the file; {advice}",
             stamps[0],
             stamps[1],
             stamps[at],
             stamps[at + 1],
-            at + 1
+            step(at),
+            step(at + 1)
         ),
         None => format!("has stamps whose distance is no length of steps that is known; {advice}"),
     }
@@ -313,9 +322,11 @@ mod tests {
         let day = |day| stamp(2001, 1, day, 0.0);
         let stamps = [day(1), day(2), day(5)];
         assert_eq!(told(&stamps), None);
-        let uneven = untold(&stamps);
-        for part in ["uneven", "2001-01-05", "the indexes 1 and 2"] {
-            assert!(uneven.contains(part), "{part}: {uneven}");
+        for (is_backwards, steps) in [(false, "the steps 2 and 3"), (true, "the steps 2 and 1")] {
+            let uneven = untold(&stamps, is_backwards);
+            for part in ["uneven", "2001-01-05", steps] {
+                assert!(uneven.contains(part), "{part}: {uneven}");
+            }
         }
     }
 }
