@@ -409,6 +409,15 @@ async fn an_axis_that_goes_backwards_is_read_as_it_is() {
             method(numbered(&[2.0, 1.0, 0.0]), "time: point"),
             period("2001-01-02T12:00:00Z", "2001-01-03T12:00:00Z"),
         ),
+        // Both bounds in the order of the axis, as the conventions have it.
+        (
+            with_bounds(
+                numbered(&[2.5, 1.5, 0.5]),
+                "bounds",
+                &[3.0, 2.0, 2.0, 1.0, 1.0, 0.0],
+            ),
+            period("2001-01-03", "2001-01-04"),
+        ),
     ] {
         let place = Place::new();
         file.write(&place.path("a.nc"));
