@@ -84,11 +84,12 @@ pub(crate) struct Settings {
         value_name = "FOLDER"
     )]
     pub(crate) data: PathBuf,
-    /// Log lines to show on standard error: error, warn, info, debug, trace, or a filter such as `ingest=debug`.
+    /// Log lines to show on standard error: error, warn, info, debug, trace, or a filter such as `ingest=debug`. Of themselves warnings,
+    /// but for what two libraries say in vain.
     #[arg(
         long,
         env = "FLUXGLOBE_LOG",
-        default_value = "warn",
+        default_value = service::USUAL_FILTER,
         global = true,
         value_name = "FILTER"
     )]
@@ -162,7 +163,7 @@ pub(crate) enum Command {
     Attach(Attach),
     /// List what has landed.
     Products(Products),
-    /// Write a product as a cube that xarray and other programs open: Zarr, or an Icechunk repository.
+    /// Write a product for other programs: as a cube (Zarr, or an Icechunk repository), NetCDF, GeoTIFFs or Parquet.
     Export(Export),
     /// Series at a place or over a region.
     #[command(subcommand)]
@@ -173,7 +174,7 @@ pub(crate) enum Command {
     FlightSql(FlightSql),
     /// Integrate a flux over a region and time (Tg C, positive out of the sea).
     Budget(Box<Budget>),
-    /// Compute a product from others: by an expression, the flux of CO2, another grid, or accumulated.
+    /// Compute a product from others: by an expression, the flux of CO2, another grid, a statistic of every cell, or accumulated.
     Derive(Box<Derive>),
     /// Draw a picture.
     #[command(subcommand)]
@@ -239,6 +240,8 @@ impl Command {
                 | Self::RenderWorker(_)
                 | Self::Recompute(_)
                 | Self::Adapters(_)
+                | Self::Bench(_)
+                | Self::Products(Products { of: Some(_), .. })
         )
     }
 
@@ -575,6 +578,29 @@ mod tests {
             let refused = parse(wrong).unwrap_err().to_string();
             assert!(refused.contains(wrong[0]), "{refused}");
         }
+    }
+
+    /// Whoever may open drivers' libraries keeps the chooser of devices from complaining (`desktop.rs`).
+    #[test]
+    fn all_that_draws_or_fills_on_a_device_is_known_to() {
+        let may_draw = |words: &str| {
+            let words = ["fluxglobe"].into_iter().chain(words.split(' '));
+            Cli::try_parse_from(words).unwrap().command.may_draw()
+        };
+        assert!(may_draw("products fill-error --product p"));
+        assert!(may_draw("bench render") && may_draw("adapters"));
+        assert!(!may_draw("products") && !may_draw("sql words"));
+    }
+
+    #[test]
+    fn a_comparison_is_drawn_as_its_file_says_and_under_no_other_name() {
+        let plot = |file: &str| {
+            let words = "fluxglobe observations matchup --product p --plot";
+            Cli::try_parse_from(words.split(' ').chain([file]))
+        };
+        assert!(plot("m.png").is_ok() && plot("m.svg").is_ok());
+        let refused = plot("m.pdf").unwrap_err().to_string();
+        assert!(refused.contains(".svg or .png"), "{refused}");
     }
 
     #[test]

@@ -19,6 +19,7 @@ mod sink;
 mod sky;
 mod viewer;
 
+use std::any::Any;
 use std::process::ExitCode;
 use std::time::Duration;
 
@@ -59,10 +60,29 @@ fn run(settings: &Settings, command: Command) -> anyhow::Result<ExitCode> {
         .enable_all()
         .build()?;
     let outcome = runtime.block_on(command::run(settings, command));
+    leave_ended_tasks_unsaid();
     // Tasks are dropped before `main` ends: drivers' exit handlers must find no device that is still held. What computes
     // or waits for a server beyond that is not waited for.
     runtime.shutdown_timeout(SHUTDOWN_LIMIT);
     outcome
+}
+
+/// Work that a failed command leaves behind ends where the runtime does, and timers that it asks for then panic. That is their end and
+/// nobody's fault: it is not told before the error that matters. All else that panics is.
+fn leave_ended_tasks_unsaid() {
+    let tell = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |panic| {
+        if !is_of_the_end(panic.payload()) {
+            tell(panic);
+        }
+    }));
+}
+
+/// Is it what tokio panics with in a runtime that ends?
+fn is_of_the_end(panic: &(dyn Any + Send)) -> bool {
+    let text = panic.downcast_ref::<&str>().copied();
+    let text = text.or_else(|| panic.downcast_ref::<String>().map(String::as_str));
+    text.is_some_and(|text| text.contains("it is being shutdown"))
 }
 
 #[expect(clippy::print_stderr, reason = "the last word of a failed command")]
@@ -90,6 +110,26 @@ fn told(error: &anyhow::Error) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The text is tokio's own: another one would be told.
+    #[test]
+    fn a_timer_in_a_runtime_that_ends_is_the_end_and_no_other_panic_is() {
+        let runtime = tokio::runtime::Builder::new_multi_thread()
+            .enable_all()
+            .build()
+            .unwrap();
+        let handle = runtime.handle().clone();
+        runtime.shutdown_timeout(SHUTDOWN_LIMIT);
+        let asked = move || {
+            let _inside = handle.enter();
+            let pause = tokio::time::sleep(Duration::from_secs(1));
+            futures::FutureExt::now_or_never(pause)
+        };
+        let panic = std::panic::catch_unwind(std::panic::AssertUnwindSafe(asked)).unwrap_err();
+        assert!(is_of_the_end(panic.as_ref()));
+        let other = std::panic::catch_unwind(|| panic!("an index")).unwrap_err();
+        assert!(!is_of_the_end(other.as_ref()));
+    }
 
     #[test]
     fn a_cause_that_was_said_is_not_said_again() {

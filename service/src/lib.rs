@@ -5,6 +5,7 @@
 pub mod admin;
 mod board;
 mod error;
+mod listen;
 mod logging;
 mod parts;
 mod readiness;
@@ -14,7 +15,8 @@ mod wait;
 
 pub use board::Board;
 pub use error::ServiceError;
-pub use logging::{LogFormat, start_logging};
+pub use listen::socket_address;
+pub use logging::{LogFormat, USUAL_FILTER, start_logging};
 pub use parts::{PartEnded, Parts};
 pub use readiness::{Part, Readiness, Report};
 pub use red::{Outcome, Red, Running};

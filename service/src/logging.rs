@@ -6,6 +6,11 @@ use tracing_subscriber::EnvFilter;
 
 use crate::ServiceError;
 
+/// What is logged unless a filter is given: warnings, without those of libraries that say what nobody can do anything about. Ballista's
+/// scheduler cannot add the measures of a stage to its plan where DataFusion measures more operators than the plan shows, which
+/// changes no answer; the rasteriser of plots tells of every shape that is too small to be seen.
+pub const USUAL_FILTER: &str = "warn,ballista_scheduler::display=off,usvg=off";
+
 /// What log lines look like.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub enum LogFormat {
@@ -37,4 +42,54 @@ pub fn start_logging(filter: &str, format: LogFormat) -> Result<(), ServiceError
             .init(),
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::{Arc, Mutex};
+
+    use tracing_subscriber::layer::{Context, Layer, SubscriberExt as _};
+
+    use super::*;
+
+    /// Keeps the targets of what is logged.
+    #[derive(Clone, Default)]
+    struct Kept(Arc<Mutex<Vec<String>>>);
+
+    impl<S: tracing::Subscriber> Layer<S> for Kept {
+        fn on_event(&self, event: &tracing::Event<'_>, _context: Context<'_, S>) {
+            let target = event.metadata().target().to_owned();
+            self.0.lock().unwrap().push(target);
+        }
+    }
+
+    fn logged(filter: &str) -> Vec<String> {
+        let kept = Kept::default();
+        let filter = EnvFilter::try_new(filter).unwrap();
+        let subscriber = tracing_subscriber::registry().with(filter);
+        tracing::subscriber::with_default(subscriber.with(kept.clone()), || {
+            tracing::error!(target: "ballista_scheduler::display", "a stage");
+            tracing::error!(target: "ballista_scheduler::state", "a job");
+            tracing::warn!(target: "usvg::parser::shapes", "a shape");
+            tracing::warn!(target: "ingest", "a file");
+            tracing::info!(target: "ingest", "another file");
+        });
+        let targets = kept.0.lock().unwrap();
+        targets.clone()
+    }
+
+    #[test]
+    fn libraries_that_cry_for_nothing_are_heard_when_asked_for() {
+        assert_eq!(
+            logged(USUAL_FILTER),
+            ["ballista_scheduler::state", "ingest"]
+        );
+        let all = [
+            "ballista_scheduler::display",
+            "ballista_scheduler::state",
+            "usvg::parser::shapes",
+            "ingest",
+        ];
+        assert_eq!(logged("warn"), all);
+    }
 }

@@ -64,7 +64,8 @@ fn an_animation_that_cannot_be_is_refused_with_what_can() {
     let place = tempfile::tempdir().unwrap();
     let data = data(place.path());
     let path = |name: &str| place.path().join(name).to_str().unwrap().to_owned();
-    let cases: [(String, &[&str], &str); 5] = [
+    let cases: [(String, &[&str], &str); 6] = [
+        (path("a.avi"), &[], ".mp4, .webm, .webp, .gif or .png"),
         (
             path("a.mp4"),
             &["--ffmpeg", "/nowhere/ffmpeg"],

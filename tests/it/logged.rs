@@ -15,3 +15,27 @@ fn log_lines_have_no_colours_where_there_is_no_terminal() {
     assert!(talk.contains(r#"service="executor""#), "{talk:?}");
     assert!(!talk.contains('\u{1b}'), "{talk:?}");
 }
+
+/// The loader of drivers says that it was opened, when told to.
+#[test]
+fn with_the_processor_alone_no_driver_is_looked_for() {
+    let place = tempfile::tempdir().unwrap();
+    let data = place.path().join("data");
+    let (file, picture) = (place.path().join("sea.h5"), place.path().join("a.png"));
+    let file = file.to_str().unwrap();
+    let generate = ["generate", "china-sea", "--scale", "0.02", "-o", file];
+    program::succeed(&data, &generate).unwrap();
+    program::succeed(&data, &["ingest", file]).unwrap();
+    let talk = |words: &[&str]| {
+        let mut command = program::command(&data);
+        let output = command.env("VK_LOADER_DEBUG", "all").args(words).output();
+        String::from_utf8_lossy(&output.unwrap().stderr).into_owned()
+    };
+    let is_opened = |talk: &str| talk.contains("Vulkan Loader Version");
+    assert!(is_opened(&talk(&["adapters"])), "the loader is not heard");
+    let words = "--cpu render globe --layer china-sea-synthetic --lon 115 --lat 20 --size 64x48 -o";
+    let mut words: Vec<&str> = words.split(' ').collect();
+    words.push(picture.to_str().unwrap());
+    let drawn = talk(&words);
+    assert!(picture.exists() && !is_opened(&drawn), "{drawn}");
+}

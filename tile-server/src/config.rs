@@ -26,7 +26,7 @@ const STREAMS: u32 = 512;
 #[derive(Debug, Clone, PartialEq, Eq, clap::Args)]
 pub struct Settings {
     /// Address and port to listen on; only this machine can reach the default
-    #[arg(long, env = "FLUXGLOBE_LISTEN", default_value_t = LISTEN)]
+    #[arg(long, env = "FLUXGLOBE_LISTEN", default_value_t = LISTEN, value_parser = service::socket_address)]
     pub listen: SocketAddr,
     /// Folder with the built viewer; without it only tiles and data are served
     #[arg(long, env = "FLUXGLOBE_VIEWER")]

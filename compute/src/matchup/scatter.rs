@@ -1,5 +1,6 @@
 //! A match-up as a picture: gridded over observed values with the line where both are equal, as SVG.
 
+use plotters::data::float::FloatPrettyPrinter;
 use plotters::prelude::{
     BLACK, ChartBuilder, Circle, Color as _, IntoDrawingArea as _, IntoFont as _, LineSeries,
     RGBColor, SVGBackend, Text, TextStyle, WHITE,
@@ -9,12 +10,16 @@ use super::Matchup;
 use crate::ComputeError;
 
 /// Width and height, pixels.
-const SIZE: (u32, u32) = (720, 720);
+const SIZE: (u32, u32) = (720, 780);
 /// Most points that are drawn: a picture of more would not show more.
 const MAX_POINTS: usize = 20_000;
 /// Share of the range that is left free around the points.
 const MARGIN: f64 = 0.05;
 const POINT: RGBColor = RGBColor(0, 90, 156);
+/// Room above the chart, pixels: what stands there hides no point.
+const HEAD_PX: u32 = 76;
+/// Left of what stands there, pixels.
+const LEFT_PX: i32 = 80;
 
 /// The picture. Of more than 20 000 pairs every n-th is drawn, and the picture says so.
 pub fn scatter_svg(matchup: &Matchup) -> Result<String, ComputeError> {
@@ -38,9 +43,15 @@ fn draw(matchup: &Matchup, svg: &mut String) -> Result<(), Box<dyn std::error::E
         ""
     };
     let caption = format!("{}{synthetic}", plain(&matchup.title));
-    let mut chart = ChartBuilder::on(&area)
-        .caption(caption, ("sans-serif", 20))
+    let (head, rest) = area.split_vertically(HEAD_PX);
+    let legend = legend(matchup, every).join(", ");
+    for (text, size, top) in [(caption, 20, 14), (legend, 15, 46)] {
+        let style = TextStyle::from(("sans-serif", size).into_font());
+        head.draw(&Text::new(text, (LEFT_PX, top), style))?;
+    }
+    let mut chart = ChartBuilder::on(&rest)
         .margin(16)
+        .margin_top(0)
         .x_label_area_size(48)
         .y_label_area_size(64)
         .build_cartesian_2d(low..high, low..high)?;
@@ -49,24 +60,29 @@ fn draw(matchup: &Matchup, svg: &mut String) -> Result<(), Box<dyn std::error::E
     } else {
         format!(" ({})", matchup.unit)
     };
+    let printer = FloatPrettyPrinter {
+        allow_scientific: false,
+        min_decimal: 1,
+        max_decimal: 5,
+    };
+    // A mark at zero is beside it by rounding, from below as well: its text would be "-0.0".
+    let nothing = (high - low) * 1e-9;
+    let mark = |place: &f64| printer.print(if place.abs() < nothing { 0.0 } else { *place });
     chart
         .configure_mesh()
+        .x_label_formatter(&mark)
+        .y_label_formatter(&mark)
         .x_desc(format!("{} observed{unit}", plain(&matchup.property)))
         .y_desc(format!("{}{unit}", matchup.manifest))
         .axis_desc_style(("sans-serif", 16))
         .draw()?;
     chart.draw_series(LineSeries::new([(low, low), (high, high)], &BLACK))?;
     chart.draw_series(points().map(|point| Circle::new(point, 2, POINT.mix(0.5).filled())))?;
-    let style = TextStyle::from(("sans-serif", 15).into_font());
-    for (line, text) in legend(matchup, every).into_iter().enumerate() {
-        let top = 56 + 20 * i32::try_from(line)?;
-        area.draw(&Text::new(text, (96, top), style.clone()))?;
-    }
     area.present()?;
     Ok(())
 }
 
-/// What is said in the corner.
+/// What is said above the chart.
 fn legend(matchup: &Matchup, every: usize) -> Vec<String> {
     let s = &matchup.statistics;
     let number = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |v| format!("{v:.3}"));
@@ -148,6 +164,30 @@ mod tests {
         }
         assert!(!svg.contains("<b>"), "a title is text, not markup");
         assert_eq!(svg, scatter_svg(&matchup(3, "Sea <b>& sky")).unwrap());
+    }
+
+    /// The highest point is the first one, in the corner at the left.
+    #[test]
+    fn what_is_said_hides_no_point() {
+        let mut made = matchup(20, "");
+        made.rows[0].gridded = 100.0;
+        let svg = scatter_svg(&made).unwrap();
+        let number = |line: &str, name: &str| -> f64 {
+            let (_, rest) = line.split_once(&format!(" {name}=\"")).unwrap();
+            rest.split('"').next().unwrap().parse().unwrap()
+        };
+        let points = svg.lines().filter(|line| line.starts_with("<circle"));
+        let highest = points.map(|at| number(at, "cy")).fold(f64::MAX, f64::min);
+        let (before, _said) = svg.split_once("N = 20").unwrap();
+        let said = before.lines().rfind(|line| line.starts_with("<text"));
+        // The place of a text is its foot or its head: it is 15 pixels high.
+        assert!(number(said.unwrap(), "y") + 15.0 < highest, "{highest}");
+        for row in &mut made.rows {
+            row.observed -= 10.0;
+            row.gridded -= 10.0;
+        }
+        let around_zero = scatter_svg(&made).unwrap();
+        assert!(around_zero.contains("\n0.0\n") && !around_zero.contains("-0.0"));
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use anyhow::Result;
+use anyhow::{Result, bail};
 use bytes::Bytes;
 
 use super::encoder::{self, Container, Encoder};
@@ -21,12 +21,19 @@ pub(super) enum Film {
     Encoder(Box<Encoder>),
 }
 
+/// What the name of an output says that is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Folder,
+    Strip,
+    Film(Container),
+}
+
 /// Can the output of the options be written? What is not there is told before anything is drawn.
 pub(super) fn check(options: &RenderAnimation) -> Result<()> {
-    let kind = extension(&options.globe.picture.output);
-    match kind.as_deref().and_then(Container::named) {
-        Some(container) => encoder::check(&options.ffmpeg, container),
-        None => Ok(()),
+    match kind(&options.globe.picture.output)? {
+        Kind::Film(container) => encoder::check(&options.ffmpeg, container),
+        Kind::Folder | Kind::Strip => Ok(()),
     }
 }
 
@@ -34,17 +41,14 @@ impl Film {
     /// Opens the output of the options.
     pub(super) fn open(options: &RenderAnimation, shots: &Shots) -> Result<Self> {
         let output = &options.globe.picture.output;
-        match extension(output).as_deref() {
-            Some("png" | "apng") => Ok(Self::Strip(Box::new(Strip::open(output, shots)?))),
-            Some(name) => match Container::named(name) {
-                Some(container) => {
-                    let encoder = Encoder::start(&options.ffmpeg, container, output, shots)?;
-                    Ok(Self::Encoder(Box::new(encoder)))
-                }
-                None => Ok(Self::Folder(Folder::open(output, shots)?)),
-            },
-            None => Ok(Self::Folder(Folder::open(output, shots)?)),
-        }
+        Ok(match kind(output)? {
+            Kind::Folder => Self::Folder(Folder::open(output, shots)?),
+            Kind::Strip => Self::Strip(Box::new(Strip::open(output, shots)?)),
+            Kind::Film(container) => {
+                let encoder = Encoder::start(&options.ffmpeg, container, output, shots)?;
+                Self::Encoder(Box::new(encoder))
+            }
+        })
     }
 
     /// Numbers of the pictures that are still to be drawn.
@@ -83,10 +87,58 @@ impl Film {
     }
 }
 
-fn extension(path: &Path) -> Option<String> {
-    let text = path.as_os_str().to_str()?;
-    if text.ends_with(std::path::MAIN_SEPARATOR) || path.is_dir() {
-        return None;
+/// A folder has no ending, one at its end, or is there already; of all else the ending says what it is.
+fn kind(path: &Path) -> Result<Kind> {
+    let name = path.as_os_str().to_string_lossy();
+    let ending = path.extension().map(|ending| ending.to_string_lossy());
+    let Some(ending) = ending.filter(|_| !name.ends_with(std::path::MAIN_SEPARATOR)) else {
+        return Ok(Kind::Folder);
+    };
+    let ending = ending.to_ascii_lowercase();
+    if path.is_dir() {
+        return Ok(Kind::Folder);
     }
-    Some(path.extension()?.to_str()?.to_ascii_lowercase())
+    if ending == "png" || ending == "apng" {
+        return Ok(Kind::Strip);
+    }
+    match Container::named(&ending) {
+        Some(container) => Ok(Kind::Film(container)),
+        None => bail!(
+            "{}: an animation is written to a file that ends in .mp4, .webm, .webp, .gif or .png, or to a folder: a name \
+             without an ending, one that ends in /, or a folder that is there",
+            path.display()
+        ),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_ending_that_is_not_written_is_refused_and_makes_no_folder_of_that_name() {
+        let place = tempfile::tempdir().unwrap();
+        let kind = |name: &str| kind(&place.path().join(name));
+        for (name, expected) in [
+            ("a.mp4", Kind::Film(Container::Mp4)),
+            ("a.WEBM", Kind::Film(Container::Webm)),
+            ("a.webp", Kind::Film(Container::Webp)),
+            ("a.gif", Kind::Film(Container::Gif)),
+            ("a.png", Kind::Strip),
+            ("a.apng", Kind::Strip),
+            ("pictures", Kind::Folder),
+            ("run.2/", Kind::Folder),
+        ] {
+            assert_eq!(kind(name).unwrap(), expected, "{name}");
+        }
+        for name in ["year.avi", "year.mov", "year.jpg", "run.2"] {
+            let refused = kind(name).unwrap_err().to_string();
+            assert!(
+                refused.contains(name) && refused.contains(".mp4, .webm, .webp, .gif or .png"),
+                "{refused}"
+            );
+        }
+        std::fs::create_dir(place.path().join("run.2")).unwrap();
+        assert_eq!(kind("run.2").unwrap(), Kind::Folder);
+    }
 }

@@ -25,6 +25,7 @@ pub(crate) struct FlightSql {
         long,
         env = "FLUXGLOBE_FLIGHT_SQL_LISTEN",
         default_value = "127.0.0.1:8815",
+        value_parser = service::socket_address,
         value_name = "ADDRESS:PORT"
     )]
     pub(crate) listen: SocketAddr,

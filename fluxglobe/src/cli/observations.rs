@@ -1,11 +1,11 @@
 //! Words of `fluxglobe observations`.
 
-use std::path::PathBuf;
-
 use clap::{Args, Subcommand, ValueEnum};
 use contract::observation::PlatformKind;
 use contract::product::ProductId;
 use contract::time::TimeMs;
+
+use super::analysis::PlotFile;
 
 /// `fluxglobe observations`. Files of observations are landed with `fluxglobe ingest`, as grids are.
 #[derive(Debug, Subcommand)]
@@ -70,9 +70,9 @@ pub(crate) struct Matchup {
     /// How time is matched.
     #[arg(long, value_enum, default_value = "nearest")]
     pub(crate) time: MatchTime,
-    /// File for a scatter plot.
-    #[arg(long, value_name = "FILE.svg")]
-    pub(crate) plot: Option<PathBuf>,
+    /// Draw it too: what the product says over what was observed.
+    #[arg(long, value_name = "FILE.svg|FILE.png")]
+    pub(crate) plot: Option<PlotFile>,
     #[command(flatten)]
     pub(crate) asked: ObservationsAsked,
 }

@@ -11,6 +11,7 @@ use contract::time::TimeMs;
 use render_worker::fleet::WorkerAddress;
 
 use super::RenderGlobe;
+use super::analysis::PlotFile;
 use crate::bench::window_size::WindowSize;
 
 /// `fluxglobe render animation`.
@@ -20,7 +21,8 @@ use crate::bench::window_size::WindowSize;
     mut_arg("output", |arg| arg
         .value_name("FILE|FOLDER")
         .help("File to write, its kind by its name: .mp4, .webm, .webp and .gif need ffmpeg, .png is an animated PNG; \
-               else a folder of PNG files, which goes on where it was left")),
+               a name without an ending, one that ends in /, and a folder that is there are folders of PNG files, which go on where they were \
+               left")),
 )]
 pub(crate) struct RenderAnimation {
     #[command(flatten)]
@@ -138,8 +140,8 @@ pub(crate) struct BenchQuality {
     #[arg(long, value_name = "FLIP")]
     pub(crate) most_flip: Option<f64>,
     /// Plot to write: both measures over what is drawn.
-    #[arg(long, value_name = "FILE.svg")]
-    pub(crate) plot: Option<PathBuf>,
+    #[arg(long, value_name = "FILE.svg|FILE.png")]
+    pub(crate) plot: Option<PlotFile>,
     /// Folder for the pictures: ours and the reference over a dark sea, and by how much ours is brighter (lighter than
     /// grey, eight times) or darker.
     #[arg(long, value_name = "FOLDER")]

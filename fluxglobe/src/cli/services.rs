@@ -25,7 +25,7 @@ pub(crate) struct Ingestd {
     #[command(flatten)]
     pub(crate) common: Common,
     /// Address of /healthz, /readyz and /metrics.
-    #[arg(long, env = "FLUXGLOBE_ADMIN", default_value = "127.0.0.1:9101")]
+    #[arg(long, env = "FLUXGLOBE_ADMIN", default_value = "127.0.0.1:9101", value_parser = service::socket_address)]
     pub(crate) admin: SocketAddr,
     #[command(flatten, next_help_heading = "Kafka")]
     pub(crate) kafka: kafka_log::KafkaSettings,
@@ -41,7 +41,7 @@ pub(crate) struct Scheduler {
     #[command(flatten)]
     pub(crate) common: Common,
     /// Address of /healthz, /readyz and /metrics.
-    #[arg(long, env = "FLUXGLOBE_ADMIN", default_value = "127.0.0.1:9102")]
+    #[arg(long, env = "FLUXGLOBE_ADMIN", default_value = "127.0.0.1:9102", value_parser = service::socket_address)]
     pub(crate) admin: SocketAddr,
     #[command(flatten, next_help_heading = "Kafka")]
     pub(crate) kafka: kafka_log::KafkaSettings,
@@ -55,7 +55,7 @@ pub(crate) struct Executor {
     #[command(flatten)]
     pub(crate) common: Common,
     /// Address of /healthz, /readyz and /metrics.
-    #[arg(long, env = "FLUXGLOBE_ADMIN", default_value = "127.0.0.1:9103")]
+    #[arg(long, env = "FLUXGLOBE_ADMIN", default_value = "127.0.0.1:9103", value_parser = service::socket_address)]
     pub(crate) admin: SocketAddr,
     #[command(flatten)]
     pub(crate) ballista: compute::service::ExecutorSettings,
@@ -67,7 +67,7 @@ pub(crate) struct RenderWorker {
     #[command(flatten)]
     pub(crate) common: Common,
     /// Address of /healthz, /readyz and /metrics.
-    #[arg(long, env = "FLUXGLOBE_ADMIN", default_value = "127.0.0.1:9104")]
+    #[arg(long, env = "FLUXGLOBE_ADMIN", default_value = "127.0.0.1:9104", value_parser = service::socket_address)]
     pub(crate) admin: SocketAddr,
     #[command(flatten, next_help_heading = "Kafka")]
     pub(crate) kafka: kafka_log::KafkaSettings,

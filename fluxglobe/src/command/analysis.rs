@@ -9,6 +9,7 @@ use compute::Engine;
 use contract::analysis::{AnalysisOptions, Hovmoller, HovmollerWishes, SeriesQuery};
 use contract::cited::Cited;
 use contract::manifest::{AskedVersion, Manifest, ManifestId};
+use contract::time::{Period, TimeMs};
 use storage::Store;
 
 use crate::cli::{PlotFile, Settings, StatsHovmoller};
@@ -88,7 +89,8 @@ pub(crate) async fn hovmoller(settings: &Settings, options: &StatsHovmoller) -> 
     let answer: Hovmoller = compute::analysis::hovmoller(&engine, version, &query).await?;
     bar.finish_and_clear();
     if let Some(file) = &options.plot {
-        plot::write(file, &plot::of_hovmoller(&answer)?)?;
+        let data = covered(&manifest, options.from, options.to)?;
+        plot::write(file, &plot::of_hovmoller(&answer, data)?)?;
     }
     if options.json {
         return progress::result(&serde_json::to_string_pretty(&answer)?);
@@ -113,6 +115,17 @@ pub(crate) async fn hovmoller(settings: &Settings, options: &StatsHovmoller) -> 
         progress::say(&format!("note: {note}"));
     }
     Ok(())
+}
+
+/// What a version covers of an asked period.
+fn covered(manifest: &Manifest, from: Option<TimeMs>, to: Option<TimeMs>) -> Result<Period> {
+    let (Some(first), Some(last)) = (manifest.steps.first(), manifest.steps.last()) else {
+        bail!("{} has no step", manifest.id());
+    };
+    let (first, last) = (first.period.start, last.period.end);
+    let start = from.map_or(first, |from| from.max(first));
+    let end = to.map_or(last, |to| to.min(last));
+    Ok(Period::new(start, end)?)
 }
 
 /// Who reads a series: one cell from its block in this process, a region or a line where regions are summed.

@@ -106,8 +106,12 @@ async fn query(settings: &Settings, store: &Store, options: &Budget) -> Result<B
     Ok(besides.of(wishes.query(options.product.product.clone()), &versions)?)
 }
 
+/// Millions of square kilometres with three decimals; what rounding leaves of nothing is nothing, and not below it.
+fn million_km2(m2: f64) -> String {
+    format!("{:.3}", (m2 / M2_PER_MILLION_KM2 * 1e3).round() / 1e3 + 0.0)
+}
+
 fn say_what(answer: &BudgetAnswer) {
-    let million_km2 = |m2: f64| m2 / M2_PER_MILLION_KM2;
     progress::say(&format!(
         "{} of {}, {} earth, positive out of the sea; {} ({}); cite {}",
         answer.unit,
@@ -118,7 +122,7 @@ fn say_what(answer: &BudgetAnswer) {
         answer.manifest
     ));
     progress::say(&format!(
-        "asked for {:.3} 10⁶ km², {:.3} of it sea; what gaps would add, not part of the budget: {}",
+        "asked for {} 10⁶ km², {} of it sea; what gaps would add, not part of the budget: {}",
         million_km2(answer.region_area_m2),
         million_km2(answer.ocean_area_m2),
         answer.gap_basis
@@ -230,5 +234,16 @@ pub(crate) fn region(text: &str) -> Result<AskedRegion> {
         Ok(AskedRegion { region, name })
     } else {
         Ok(text.parse()?)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nothing_has_no_sign() {
+        let texts = [5.1e14, 4e8, -3.0, -0.0].map(million_km2);
+        assert_eq!(texts, ["510.000", "0.000", "0.000", "0.000"]);
     }
 }

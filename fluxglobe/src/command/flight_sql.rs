@@ -7,11 +7,13 @@ use compute::flight_sql::{Access, FlightSqlLimits, FlightSqlServer, Token};
 use compute::sql::Sql;
 
 use crate::cli::{FlightSql, Settings};
+use crate::command::serve;
 use crate::{deployment, progress};
 
 pub(crate) async fn run(settings: &Settings, options: &FlightSql) -> Result<()> {
     let token = options.token_file.as_deref().map(token).transpose()?;
     let access = Access::new(token, options.listen)?;
+    serve::check_free(options.listen)?;
     let store = deployment::interactive_store(settings)?;
     let sql = Sql::new(
         &deployment::in_process(settings, store),

@@ -1,16 +1,16 @@
 //! `fluxglobe observations`: which platforms there are, what they measured, and how a product compares with it.
 
-use anyhow::{Context as _, Result, bail};
-use comfy_table::Table;
+use anyhow::{Result, bail};
 use comfy_table::presets::NOTHING;
-use compute::matchup::{self, TimeMatch};
+use comfy_table::{CellAlignment, Table};
+use compute::matchup::{self, LeftOut, TimeMatch};
 use contract::masked::MaskedCells;
 use contract::observation::{Filter, MAX_LIMIT, Observation};
 use observations::ObservationStore;
 
 use crate::cli::{MatchTime, Matchup, Observations, ObservationsAsked, Settings};
 use crate::command::budget;
-use crate::{deployment, progress};
+use crate::{deployment, plot, progress};
 
 pub(crate) async fn run(settings: &Settings, command: Observations) -> Result<()> {
     match command {
@@ -105,11 +105,17 @@ async fn masked(store: &storage::Store, asked: &ObservationsAsked) -> Result<Vec
 
 async fn query(settings: &Settings, asked: &ObservationsAsked) -> Result<()> {
     let store = observations::open(&asked.store, &deployment::store(settings)?)?;
-    let rows = all(store.as_ref(), asked).await?;
+    let (rows, is_all) = all(store.as_ref(), asked).await?;
+    let warn = || {
+        if !is_all {
+            progress::say(&cut(asked.limit));
+        }
+    };
     if asked.json {
         for row in &rows {
             progress::result(&serde_json::to_string(row)?)?;
         }
+        warn();
         return Ok(());
     }
     let mut table = Table::new();
@@ -130,18 +136,28 @@ async fn query(settings: &Settings, asked: &ObservationsAsked) -> Result<()> {
             o.quality.flag().to_string(),
         ]);
     }
-    progress::result(&table.to_string())
+    progress::result(&table.to_string())?;
+    warn();
+    Ok(())
 }
 
-/// Up to the limit, page by page.
-async fn all(store: &dyn ObservationStore, asked: &ObservationsAsked) -> Result<Vec<Observation>> {
+/// What is said where there are more observations than the limit.
+fn cut(limit: u32) -> String {
+    format!("these are the first {limit}, and there are more: --limit takes up to 1000000")
+}
+
+/// Up to the limit, page by page; and whether these are all that there are.
+async fn all(
+    store: &dyn ObservationStore,
+    asked: &ObservationsAsked,
+) -> Result<(Vec<Observation>, bool)> {
     let (mut filter, mut rows) = (filter(asked)?, vec![]);
     loop {
         filter.limit = (asked.limit - rows.len() as u32).min(MAX_LIMIT);
         let page = store.query(&filter).await?;
         rows.extend(page.observations);
         if page.next.is_none() || rows.len() >= asked.limit as usize {
-            return Ok(rows);
+            return Ok((rows, page.next.is_none()));
         }
         filter.after = page.next;
     }
@@ -154,32 +170,122 @@ async fn matchup(settings: &Settings, options: &Matchup) -> Result<()> {
     let store = deployment::store(settings)?;
     let manifest = deployment::manifest(&store, &options.product, &settings.data).await?;
     let found = observations::open(&options.asked.store, &store)?;
-    let rows = all(found.as_ref(), &options.asked).await?;
+    let (rows, is_all) = all(found.as_ref(), &options.asked).await?;
     let time = match options.time {
         MatchTime::Nearest => TimeMatch::Nearest,
         MatchTime::Linear => TimeMatch::Linear,
     };
     let matched = matchup::matchup(&store, &manifest, &rows, time).await?;
     if let Some(file) = &options.plot {
-        let svg = matchup::scatter_svg(&matched)?;
-        std::fs::write(file, svg).with_context(|| format!("cannot write {}", file.display()))?;
-        progress::say(&format!("plot in {}", file.display()));
+        plot::write(file, &matchup::scatter_svg(&matched)?)?;
+    }
+    if !is_all {
+        progress::say(&cut(options.asked.limit));
     }
     if options.asked.json {
         return progress::result(&serde_json::to_string_pretty(&matched)?);
     }
-    progress::result(&format!("{:#?}", matched.statistics))?;
+    progress::result(&compared(&matched).to_string())?;
     progress::say(&format!(
-        "{} of {} observations{}; left out: {:?}; against {}",
+        "{} less {} at {} of {} observations; left out: {}",
+        matched.manifest,
+        matched.property,
         matched.rows.len(),
         rows.len(),
-        if matched.unit.is_empty() {
-            String::new()
-        } else {
-            format!(" in {}", matched.unit)
-        },
-        matched.left_out,
-        manifest.id()
+        left_out(matched.left_out)
     ));
+    progress::say(&manifest.source);
     Ok(())
+}
+
+/// How a product and observations differ, one row in the unit that people read.
+fn compared(matched: &matchup::Matchup) -> Table {
+    let s = &matched.statistics;
+    let number = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |v| format!("{v:.4}"));
+    let with_unit = |name: &str| match matched.unit.as_str() {
+        "" => name.to_owned(),
+        unit => format!("{name}, {unit}"),
+    };
+    let columns = [
+        ("pairs".to_owned(), s.count.to_string()),
+        (with_unit("bias"), number(s.bias)),
+        (with_unit("RMSE"), number(s.rmse)),
+        ("r".to_owned(), number(s.correlation)),
+        (with_unit("mean observed"), number(s.observed_mean)),
+        (with_unit("mean of the product"), number(s.gridded_mean)),
+    ];
+    let mut table = Table::new();
+    table.load_preset(NOTHING);
+    let (header, row): (Vec<String>, Vec<String>) = columns.into_iter().unzip();
+    table.set_header(header);
+    table.add_row(row);
+    for column in table.column_iter_mut() {
+        column.set_cell_alignment(CellAlignment::Right);
+    }
+    table
+}
+
+/// Why observations have no partner, in words.
+fn left_out(out: LeftOut) -> String {
+    let reasons = [
+        (out.other_time, "at times that no step covers"),
+        (out.outside, "outside the grid"),
+        (out.no_data, "in cells without data"),
+    ];
+    let there = reasons.into_iter().filter(|(count, _)| *count > 0);
+    let texts: Vec<String> = there
+        .map(|(count, reason)| format!("{count} {reason}"))
+        .collect();
+    if texts.is_empty() {
+        "none".to_owned()
+    } else {
+        texts.join(", ")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use compute::matchup::statistics::Statistics;
+
+    use super::*;
+
+    #[test]
+    fn a_comparison_is_a_row_with_units_and_what_is_left_out_is_told_in_words() {
+        let left = LeftOut {
+            other_time: 3,
+            outside: 0,
+            no_data: 2,
+        };
+        let pairs = [(20.0, 21.0), (22.0, 24.0)];
+        let matched = matchup::Matchup {
+            product: "sst".parse().unwrap(),
+            manifest: "sst@1-00000000".parse().unwrap(),
+            title: String::new(),
+            source: String::new(),
+            synthetic: false,
+            property: "sea_surface_temperature".to_owned(),
+            unit: "°C".to_owned(),
+            time_match: TimeMatch::Nearest,
+            rows: vec![],
+            statistics: Statistics::of(&pairs.into_iter()),
+            left_out: left,
+        };
+        let text = compared(&matched).to_string();
+        let words = |line: &str| line.split_whitespace().map(str::to_owned).collect();
+        let lines: Vec<Vec<String>> = text.lines().map(words).collect();
+        assert_eq!(
+            lines[0].join(" "),
+            "pairs bias, °C RMSE, °C r mean observed, °C mean of the product, °C"
+        );
+        // Differences 1 and 2: mean 1.5, mean square 2.5.
+        assert_eq!(
+            lines[1],
+            ["2", "1.5000", "1.5811", "1.0000", "21.0000", "22.5000"]
+        );
+        assert_eq!(
+            left_out(left),
+            "3 at times that no step covers, 2 in cells without data"
+        );
+        assert_eq!(left_out(LeftOut::default()), "none");
+    }
 }

@@ -1,16 +1,23 @@
 //! `fluxglobe render`: a product, an instant and a view in, a PNG file out.
 
-use anyhow::{Context as _, Result};
+use std::path::Path;
+
+use anyhow::{Context as _, Result, bail};
 use contract::job::View;
 use contract::tile::Tile;
 use render_worker::desk::{Order, Storing};
 
-use crate::cli::{Render, Settings};
+use crate::cli::{Render, RenderGlobe, RenderTile, Settings};
 use crate::command::legend;
 use crate::picture::Extras;
 use crate::{animation, deployment, heights, picture, progress, sky};
 
 pub(crate) async fn run(settings: &Settings, options: Render) -> Result<()> {
+    if let Render::Tile(RenderTile { picture, .. }) | Render::Globe(RenderGlobe { picture, .. }) =
+        &options
+    {
+        check(&picture.output)?;
+    }
     let store = deployment::store(settings)?;
     let (asked, view, extras) = match options {
         Render::Tile(tile) => {
@@ -45,4 +52,35 @@ pub(crate) async fn run(settings: &Settings, options: Render) -> Result<()> {
         .with_context(|| format!("cannot write {}", asked.output.display()))?;
     progress::done(&bar, &format!("{} bytes", png.len()));
     progress::result(&asked.output.display().to_string())
+}
+
+/// Does a file's name say what is written? Asked before anything is drawn.
+fn check(output: &Path) -> Result<()> {
+    let ending = output.extension();
+    if ending.is_some_and(|ending| ending.eq_ignore_ascii_case("png")) {
+        return Ok(());
+    }
+    bail!(
+        "{}: a picture is written as PNG: give a name that ends in .png",
+        output.display()
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_picture_is_not_written_under_the_name_of_another_form() {
+        for name in ["a.png", "b/A.PNG", "year.2.png"] {
+            check(Path::new(name)).unwrap();
+        }
+        for name in ["a.jpg", "a.webp", "a", "png", ".png", "a.png.tif"] {
+            let refused = check(Path::new(name)).unwrap_err().to_string();
+            assert!(
+                refused.starts_with(name) && refused.contains("ends in .png"),
+                "{refused}"
+            );
+        }
+    }
 }

@@ -1,5 +1,7 @@
 //! `fluxglobe serve`: a data folder in, tiles, views, statistics and the viewer over HTTP out.
 
+use std::io::ErrorKind;
+use std::net::{SocketAddr, TcpListener};
 use std::num::NonZeroUsize;
 use std::sync::Arc;
 use std::time::Duration;
@@ -10,7 +12,7 @@ use contract::check::Check;
 use observations::FileStore;
 use render_worker::{Desk, Limits};
 use storage::Store;
-use tile_server::{AppState, Server};
+use tile_server::{AppState, ServeError, Server};
 
 use crate::cli::Settings;
 use crate::ports::{Analyst, Drawer, Observer};
@@ -25,6 +27,17 @@ pub(crate) async fn run(settings: &Settings, options: tile_server::config::Setti
     let server = bind(settings, store, options, check).await?;
     announce(&server);
     until_asked_to_stop(server).await
+}
+
+/// Can an address be listened on? Asked by those who have long work to do before they listen.
+pub(crate) fn check_free(address: SocketAddr) -> Result<(), ServeError> {
+    match TcpListener::bind(address) {
+        Ok(_taken_for_a_moment) => Ok(()),
+        Err(source) if source.kind() == ErrorKind::AddrInUse => {
+            Err(ServeError::PortTaken { address })
+        }
+        Err(source) => Err(ServeError::Listen { address, source }),
+    }
 }
 
 /// A server that listens but does not answer yet.
@@ -94,4 +107,21 @@ pub(crate) async fn until_asked_to_stop(serving: Serving) -> Result<()> {
         tracing::warn!("some pictures that were given out are not stored");
     }
     Ok(served?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_taken_port_is_told_before_anything_else_and_a_free_one_stays_free() {
+        let taken = TcpListener::bind("127.0.0.1:0").unwrap();
+        let address = taken.local_addr().unwrap();
+        let refused = check_free(address).unwrap_err().to_string();
+        let expected = format!("port {} is in use by another program", address.port());
+        assert!(refused.starts_with(&expected), "{refused}");
+        drop(taken);
+        check_free(address).unwrap();
+        check_free(address).unwrap();
+    }
 }

@@ -52,13 +52,9 @@ pub(crate) async fn run(
         Form::Table => progress::result(&table(&answer).to_string())?,
     }
     progress::say(&format!(
-        "{}, {} of {} ({:.6e} {}) on the {} earth; cite {}",
+        "{}, {}; cite {}",
         answer.cited.titled(),
-        answer.kind,
-        answer.geometry,
-        answer.size,
-        answer.size_unit,
-        answer.earth,
+        taken(&answer),
         answer.cited.manifest
     ));
     for one in &answer.statistics {
@@ -84,6 +80,17 @@ pub(crate) async fn run(
     }
     progress::say(&answer.cited.source);
     Ok(())
+}
+
+/// What statistics are of, with its size; a point has none.
+fn taken(answer: &StatisticsAnswer) -> String {
+    if answer.size_unit == "1" {
+        return format!("{} {}", answer.kind, answer.geometry);
+    }
+    format!(
+        "{} of {} ({:.6e} {}) on the {} earth",
+        answer.kind, answer.geometry, answer.size, answer.size_unit, answer.earth
+    )
 }
 
 fn table(answer: &StatisticsAnswer) -> Table {
@@ -137,4 +144,27 @@ pub(crate) fn csv(answer: &dyn Tabular) -> Result<String> {
     let mut text = String::from_utf8(content)?;
     text.truncate(text.trim_end().len());
     Ok(text)
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    #[test]
+    fn a_point_has_no_size_and_lies_on_no_figure_of_the_earth() {
+        let of = |kind: &str, geometry: &str, size: f64, unit: &str| {
+            let answer = json!({"product": "sst", "manifest": "sst@1-00000000", "title": "", "source": "", "synthetic": false,
+                "quantity": "sea_surface_temperature", "unit": "°C", "kind": kind, "geometry": geometry, "step": "month",
+                "earth": "wgs84", "cells": "whole", "statistics": [], "coverage_basis": "", "size": size, "size_unit": unit,
+                "min_coverage_percent": 0.0, "ocean_source": null, "notes": [], "rows": []});
+            taken(&serde_json::from_value(answer).unwrap())
+        };
+        assert_eq!(of("point", "0,10", 1.0, "1"), "point 0,10");
+        assert_eq!(
+            of("area", "global", 5.1e14, "m²"),
+            "area of global (5.100000e14 m²) on the wgs84 earth"
+        );
+    }
 }

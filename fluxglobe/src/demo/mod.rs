@@ -40,6 +40,7 @@ pub(crate) async fn run(settings: &Settings, options: Demo) -> Result<ExitCode> 
         progress::result(&folder.display().to_string())?;
         return Ok(ExitCode::SUCCESS);
     }
+    serve::check_free(options.serve.listen)?;
     let store = deployment::store(settings)?;
     let inputs = inputs(&store, &cache, &options).await?;
     let check = compute(settings, &store, &inputs).await?;

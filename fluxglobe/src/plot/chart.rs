@@ -6,13 +6,12 @@ use contract::analysis::{Hovmoller, SeriesAnalysis};
 use contract::cited::Cited;
 use contract::time::{Period, TimeMs};
 use plotters::chart::ChartContext;
-use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::{
     BLACK, Cartesian2d, ChartBuilder, Circle, Color as _, LineSeries, Polygon, RGBColor,
     SVGBackend, SeriesLabelPosition, WHITE,
 };
 
-use super::marked::Marked;
+use super::marked::{Marked, Marks};
 use super::page::{Area, COLOURS, Failed, with_unit};
 use super::time_axis::TimeAxis;
 
@@ -20,8 +19,7 @@ use super::time_axis::TimeAxis;
 const DOTS_UP_TO: usize = 400;
 
 /// A chart on a part of a page.
-pub(super) type Chart<'a, 'b> =
-    ChartContext<'a, SVGBackend<'b>, Cartesian2d<Marked, RangedCoordf64>>;
+pub(super) type Chart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<Marked, Marked>>;
 
 /// A value in the middle of a step; none where there is a gap.
 pub(super) type Point = (Period, Option<f64>);
@@ -76,15 +74,17 @@ pub(super) fn chart<'a, 'b>(
     values: Range<f64>,
     label: &str,
 ) -> Result<Chart<'a, 'b>, Failed> {
+    let marks = Marks::round(&values);
     let mut chart = ChartBuilder::on(area)
         .margin_left(14)
         .margin_right(34)
         .x_label_area_size(34)
         .y_label_area_size(76)
-        .build_cartesian_2d(Marked::new(axis.range.clone(), axis.marks.clone()), values)?;
+        .build_cartesian_2d(axis.marks.over(axis.range.clone()), marks.over(values))?;
     chart
         .configure_mesh()
-        .x_label_formatter(&|place| axis.text(place))
+        .x_label_formatter(&|place| axis.marks.text(place))
+        .y_label_formatter(&|place| marks.text(place))
         .y_desc(label)
         .axis_desc_style(("sans-serif", 15))
         .label_style(("sans-serif", 13))
@@ -104,6 +104,10 @@ pub(super) fn lines(
     let at = |(period, value): &Point| value.map(|value| (axis.at(period.mid()), value));
     for run in points.chunk_by(|a, b| a.1.is_some() && b.1.is_some()) {
         let run: Vec<(f64, f64)> = run.iter().filter_map(at).collect();
+        // A step by itself is a dot.
+        if run.len() < 2 {
+            continue;
+        }
         chart.draw_series(LineSeries::new(run, colour.stroke_width(2)))?;
     }
     let is_alone = |i: usize| {

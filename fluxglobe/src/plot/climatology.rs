@@ -5,7 +5,7 @@ use contract::analysis::{CalendarBins, Climatology, ClimatologyRow, SeriesAnalys
 use plotters::prelude::{BLACK, ChartBuilder, Circle, Color as _, LineSeries, Polygon};
 
 use super::chart::place;
-use super::marked::Marked;
+use super::marked::Marks;
 use super::page::{self, Area, COLOURS, Failed, Words, range, with_unit};
 
 /// Bins up to which each is marked by a dot.
@@ -14,10 +14,13 @@ const DOTS_UP_TO: usize = 12;
 const LETTERS: usize = 3;
 
 pub(super) fn drawn(answer: &SeriesAnalysis, made: &Climatology) -> Result<String> {
-    let below = format!(
-        "{} climatology of {}: mean, and one standard deviation of its steps on either side",
-        made.bins, made.base
-    );
+    let has_spread = made.rows.iter().any(|row| row.spread.is_some());
+    let spread = if has_spread {
+        ", and one standard deviation of its steps on either side"
+    } else {
+        "; no part of the year has two steps, so that there is no standard deviation"
+    };
+    let below = format!("{} climatology of {}: mean{spread}", made.bins, made.base);
     let words = Words::of(&answer.cited, &place(answer), below);
     page::drawn(&words, |area| on(area, answer, made))
 }
@@ -30,23 +33,20 @@ fn on(area: &Area<'_>, answer: &SeriesAnalysis, made: &Climatology) -> Result<()
             .flat_map(move |mean| [mean - spread, mean + spread])
     };
     let values = range(made.rows.iter().flat_map(ends));
-    let marks = marks(made.bins);
-    let places: Vec<f64> = marks.iter().map(|(place, _)| *place).collect();
-    let text = |place: &f64| {
-        let mark = marks.iter().find(|(at, _)| (at - place).abs() < 1e-6);
-        mark.map(|(_, text)| text.clone()).unwrap_or_default()
-    };
+    let marks = Marks::new(marks(made.bins));
+    let value_marks = Marks::round(&values);
     let last = made.rows.len() as f64 - 0.5;
     let mut chart = ChartBuilder::on(area)
         .margin_left(14)
         .margin_right(34)
         .x_label_area_size(34)
         .y_label_area_size(76)
-        .build_cartesian_2d(Marked::new(-0.5..last, places), values)?;
+        .build_cartesian_2d(marks.over(-0.5..last), value_marks.over(values))?;
     let cited = &answer.cited;
     chart
         .configure_mesh()
-        .x_label_formatter(&text)
+        .x_label_formatter(&|place| marks.text(place))
+        .y_label_formatter(&|place| value_marks.text(place))
         .y_desc(with_unit(cited.quantity.title(), &cited.unit))
         .axis_desc_style(("sans-serif", 15))
         .label_style(("sans-serif", 13))
@@ -55,18 +55,28 @@ fn on(area: &Area<'_>, answer: &SeriesAnalysis, made: &Climatology) -> Result<()
         .draw()?;
     let rows: Vec<(usize, &ClimatologyRow)> = made.rows.iter().enumerate().collect();
     let colour = COLOURS[0];
-    for run in rows.chunk_by(|a, b| a.1.mean.is_some() && b.1.mean.is_some()) {
-        let line = |factor: f64| {
-            run.iter().filter_map(move |(bin, row)| {
-                let spread = row.spread.unwrap_or_default();
-                Some((*bin as f64, row.mean? + factor * spread))
-            })
+    let at = |(bin, row): &(usize, &ClimatologyRow), factor: f64| {
+        let aside = if factor == 0.0 {
+            0.0
+        } else {
+            factor * row.spread?
         };
-        let mut edge: Vec<(f64, f64)> = line(1.0).collect();
-        let other: Vec<(f64, f64)> = line(-1.0).collect();
-        edge.extend(other.into_iter().rev());
-        chart.draw_series([Polygon::new(edge, colour.mix(0.2).filled())])?;
-        chart.draw_series(LineSeries::new(line(0.0), colour.stroke_width(2)))?;
+        Some((*bin as f64, row.mean? + aside))
+    };
+    let has = |place: &(usize, &ClimatologyRow), factor| at(place, factor).is_some();
+    // The band is broken where there is no spread, the line where there is no mean.
+    for run in rows.chunk_by(|a, b| has(a, 1.0) && has(b, 1.0)) {
+        let mut edge: Vec<(f64, f64)> = run.iter().filter_map(|place| at(place, 1.0)).collect();
+        edge.extend(run.iter().rev().filter_map(|place| at(place, -1.0)));
+        if edge.len() > 2 {
+            chart.draw_series([Polygon::new(edge, colour.mix(0.2).filled())])?;
+        }
+    }
+    for run in rows.chunk_by(|a, b| has(a, 0.0) && has(b, 0.0)) {
+        let line: Vec<(f64, f64)> = run.iter().filter_map(|place| at(place, 0.0)).collect();
+        if line.len() > 1 {
+            chart.draw_series(LineSeries::new(line, colour.stroke_width(2)))?;
+        }
     }
     if made.rows.len() <= DOTS_UP_TO {
         let dots = rows

@@ -3,6 +3,7 @@
 use anyhow::Result;
 use contract::analysis::{Along, Hovmoller};
 use contract::colour::{Palette, TransferFunction};
+use contract::time::{Period, TimeMs};
 use legend::ticks;
 use plotters::prelude::{
     BLACK, ChartBuilder, Color as _, IntoFont as _, PathElement, RGBColor, Rectangle, Text,
@@ -10,7 +11,7 @@ use plotters::prelude::{
 };
 
 use super::chart::shares_of;
-use super::marked::Marked;
+use super::marked::Marks;
 use super::page::{self, Area, Failed, SIZE, Words, with_unit};
 use super::time_axis::TimeAxis;
 
@@ -78,7 +79,8 @@ fn around(low: f64, high: f64, palette: Palette) -> (f64, f64) {
     }
 }
 
-pub(super) fn drawn(answer: &Hovmoller) -> Result<String> {
+/// The axis of time ends where `data` do: the first and the last row may reach beyond them.
+pub(super) fn drawn(answer: &Hovmoller, data: Period) -> Result<String> {
     let what = match answer.along {
         Along::Lat => "latitude against time",
         Along::Lon => "longitude against time",
@@ -95,7 +97,7 @@ pub(super) fn drawn(answer: &Hovmoller) -> Result<String> {
     let colours = Colours::of(answer);
     page::drawn(&words, |area| {
         let (left, right) = area.split_horizontally(SIZE.0 - BAR_AREA_PX);
-        chart(&left, answer, &colours)?;
+        chart(&left, answer, data, &colours)?;
         bar(&right, answer, &colours)
     })
 }
@@ -109,24 +111,28 @@ fn no_data(answer: &Hovmoller) -> String {
     format!("no data, or a coverage of less than {least} %")
 }
 
-fn chart(area: &Area<'_>, answer: &Hovmoller, colours: &Colours) -> Result<(), Failed> {
+fn chart(
+    area: &Area<'_>,
+    answer: &Hovmoller,
+    data: Period,
+    colours: &Colours,
+) -> Result<(), Failed> {
     let (first, last) = (&answer.rows[0], &answer.rows[answer.rows.len() - 1]);
-    let axis = TimeAxis::over(first.start, last.end);
+    let within = |time: TimeMs| time.clamp(data.start, data.end);
+    let axis = TimeAxis::over(within(first.start), within(last.end));
     let (low, high) = (
         answer.bands[0].low_deg,
         answer.bands[answer.bands.len() - 1].high_deg,
     );
+    let marks = Marks::round(&(low..high));
     let mut chart = ChartBuilder::on(area)
         .margin_left(14)
         .margin_right(10)
         .x_label_area_size(34)
         .y_label_area_size(76)
-        .build_cartesian_2d(
-            Marked::new(axis.range.clone(), axis.marks.clone()),
-            low..high,
-        )?;
+        .build_cartesian_2d(axis.marks.over(axis.range.clone()), marks.over(low..high))?;
     let cells = answer.rows.iter().flat_map(|row| {
-        let (from, to) = (axis.at(row.start), axis.at(row.end));
+        let (from, to) = (axis.at(within(row.start)), axis.at(within(row.end)));
         row.means
             .iter()
             .zip(&answer.bands)
@@ -143,7 +149,8 @@ fn chart(area: &Area<'_>, answer: &Hovmoller, colours: &Colours) -> Result<(), F
     chart
         .configure_mesh()
         .disable_mesh()
-        .x_label_formatter(&|place| axis.text(place))
+        .x_label_formatter(&|place| axis.marks.text(place))
+        .y_label_formatter(&|place| marks.text(place))
         .y_desc(label)
         .axis_desc_style(("sans-serif", 15))
         .label_style(("sans-serif", 13))

@@ -64,7 +64,8 @@ pub(super) fn of_anomalies(answer: &SeriesAnalysis, made: &Anomalies) -> Result<
         let unit = &answer.cited.unit;
         let mut chart = chart(area, &axis, values, &with_unit("anomaly", unit))?;
         let bars = points.iter().filter_map(|(period, value)| {
-            let value = (*value)?;
+            // What is zero has no bar.
+            let value = (*value).filter(|value| *value != 0.0)?;
             let colour = if value < 0.0 { COLOURS[0] } else { COLOURS[1] };
             let corners = [(axis.at(period.start), 0.0), (axis.at(period.end), value)];
             Some(Rectangle::new(corners, colour.filled()))

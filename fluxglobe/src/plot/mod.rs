@@ -15,6 +15,7 @@ use anyhow::{Context as _, Result, bail};
 use contract::analysis::{Hovmoller, SeriesAnalysis};
 use contract::series::{PointSeries, RegionSeries};
 use contract::statistics::StatisticsAnswer;
+use contract::time::Period;
 
 use crate::cli::{PlotFile, PlotForm};
 
@@ -69,11 +70,11 @@ pub(crate) fn of_analysis(answer: &SeriesAnalysis) -> Result<String> {
     bail!("there is nothing to plot: {}", reasons.join("; "))
 }
 
-/// Latitude or longitude against time; of the whole period in one row its profile.
-pub(crate) fn of_hovmoller(answer: &Hovmoller) -> Result<String> {
+/// Latitude or longitude against time, as far as there are data; of the whole period in one row its profile.
+pub(crate) fn of_hovmoller(answer: &Hovmoller, data: Period) -> Result<String> {
     match answer.rows.as_slice() {
         [row] if !row.stds.is_empty() => profile::drawn(answer, row),
-        _ => hovmoller::drawn(answer),
+        _ => hovmoller::drawn(answer, data),
     }
 }
 

@@ -22,12 +22,16 @@ const FOOT_LINE_PX: u32 = 16;
 const MARGIN_PX: i32 = 24;
 const INK: RGBColor = RGBColor(34, 34, 34);
 const QUIET: RGBColor = RGBColor(90, 90, 90);
-/// Colours that are told apart by all (Okabe and Ito 2008): blue, vermilion, green, purple.
-pub(super) const COLOURS: [RGBColor; 4] = [
+/// Colours that are told apart by all (Okabe and Ito 2008), their eight: blue, vermilion, green, purple, orange, sky blue, black, yellow.
+pub(super) const COLOURS: [RGBColor; 8] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
     RGBColor(0, 158, 115),
     RGBColor(204, 121, 167),
+    RGBColor(230, 159, 0),
+    RGBColor(86, 180, 233),
+    RGBColor(0, 0, 0),
+    RGBColor(240, 228, 66),
 ];
 
 /// What cannot be drawn: it borrows from the drawing, and its words are what matters.

@@ -5,6 +5,7 @@ use contract::analysis::{Along, Hovmoller, HovmollerRow};
 use plotters::prelude::{BLACK, ChartBuilder, Circle, Color as _, LineSeries, Polygon};
 
 use super::chart::shares_of;
+use super::marked::Marks;
 use super::page::{self, Area, COLOURS, Failed, Words, range, with_unit};
 
 /// Bands up to which each is marked by a dot.
@@ -37,15 +38,18 @@ fn on(area: &Area<'_>, answer: &Hovmoller, row: &HovmollerRow) -> Result<(), Fai
     let ends = |(_, mean, std): &Place| [mean - std, mean + std];
     let values = range(places.iter().flatten().flat_map(ends));
     let across = answer.bands[0].low_deg..answer.bands[answer.bands.len() - 1].high_deg;
+    let (across_marks, value_marks) = (Marks::round(&across), Marks::round(&values));
     let mut chart = ChartBuilder::on(area)
         .margin_left(14)
         .margin_right(34)
         .x_label_area_size(54)
         .y_label_area_size(76)
-        .build_cartesian_2d(across, values)?;
+        .build_cartesian_2d(across_marks.over(across), value_marks.over(values))?;
     let cited = &answer.cited;
     chart
         .configure_mesh()
+        .x_label_formatter(&|place| across_marks.text(place))
+        .y_label_formatter(&|place| value_marks.text(place))
         .x_desc(match answer.along {
             Along::Lat => "degrees north",
             Along::Lon => "degrees east",
@@ -67,7 +71,9 @@ fn on(area: &Area<'_>, answer: &Hovmoller, row: &HovmollerRow) -> Result<(), Fai
         let other: Vec<(f64, f64)> = line(-1.0).collect();
         edge.extend(other.into_iter().rev());
         chart.draw_series([Polygon::new(edge, colour.mix(0.2).filled())])?;
-        chart.draw_series(LineSeries::new(line(0.0), colour.stroke_width(2)))?;
+        if run.len() > 1 {
+            chart.draw_series(LineSeries::new(line(0.0), colour.stroke_width(2)))?;
+        }
     }
     if places.len() <= DOTS_UP_TO {
         let dots = places.iter().flatten();

@@ -11,18 +11,7 @@ use super::page::{self, COLOURS, Words, range};
 
 pub(super) fn of_statistics(answer: &StatisticsAnswer) -> Result<String> {
     let cited = &answer.cited;
-    let is_spread = |name: &str| name == Statistic::Std.to_string();
-    let all = answer.statistics.iter();
-    let names: Vec<&str> = all
-        .filter(|one| one.unit == cited.unit && !is_spread(&one.name))
-        .map(|one| one.name.as_str())
-        .take(COLOURS.len())
-        .collect();
-    if names.is_empty() {
-        bail!(
-            "a plot is of statistics in the product's unit: ask for mean, min, max, median or percentiles"
-        );
-    }
+    let Split { names, others } = split(answer)?;
     let of_name = |name: &str| -> Vec<Point> {
         let value = |row: &StatisticsRow| row.values.get(name).copied().flatten();
         let rows = answer.rows.iter();
@@ -46,7 +35,7 @@ pub(super) fn of_statistics(answer: &StatisticsAnswer) -> Result<String> {
     let (low, high) = (ends(-1.0), ends(1.0));
     let has_band = low.iter().any(|(_, value)| value.is_some());
     let below = format!(
-        "{} of {}, a row a {}{}",
+        "{} of {}, a row a {}{}{}",
         names.join(", "),
         answer.kind,
         answer.step,
@@ -54,6 +43,11 @@ pub(super) fn of_statistics(answer: &StatisticsAnswer) -> Result<String> {
             "; band: mean and one standard deviation on either side"
         } else {
             ""
+        },
+        if others.is_empty() {
+            String::new()
+        } else {
+            format!("; not drawn, of another unit: {}", others.join(", "))
         }
     );
     let words = Words::of(cited, &named(&answer.geometry), below);
@@ -75,4 +69,38 @@ pub(super) fn of_statistics(answer: &StatisticsAnswer) -> Result<String> {
         }
         legend(&mut chart)
     })
+}
+
+/// Names of statistics.
+struct Split<'a> {
+    /// Those that have lines.
+    names: Vec<&'a str>,
+    /// Those that are drawn in no way: they have another unit.
+    others: Vec<&'a str>,
+}
+
+/// What is drawn: the standard deviation is the band of a mean that is asked for, else a line.
+fn split(answer: &StatisticsAnswer) -> Result<Split<'_>> {
+    let (mean, spread) = (Statistic::Mean.to_string(), Statistic::Std.to_string());
+    let has_mean = answer.statistics.iter().any(|one| one.name == mean);
+    let all = answer.statistics.iter();
+    let (own, others): (Vec<_>, Vec<_>) = all
+        .filter(|one| !(has_mean && one.name == spread))
+        .partition(|one| one.unit == answer.cited.unit);
+    let names: Vec<&str> = own.into_iter().map(|one| one.name.as_str()).collect();
+    if names.is_empty() {
+        bail!(
+            "a plot is of statistics in the product's unit: ask for mean, min, max, median or percentiles"
+        );
+    }
+    if names.len() > COLOURS.len() {
+        bail!(
+            "a plot has colours for {} statistics, and {} were asked for: {}; leave some out",
+            COLOURS.len(),
+            names.len(),
+            names.join(", ")
+        );
+    }
+    let others = others.into_iter().map(|one| one.name.as_str()).collect();
+    Ok(Split { names, others })
 }

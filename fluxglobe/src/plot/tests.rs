@@ -24,6 +24,13 @@ fn analysis(part: &str, made: Value) -> SeriesAnalysis {
     serde_json::from_value(all).unwrap()
 }
 
+/// Bands over two years.
+fn bands_of(made: Value) -> String {
+    let answer = serde_json::from_value(cited(made)).unwrap();
+    let data = Period::new("2001".parse().unwrap(), "2003".parse().unwrap()).unwrap();
+    of_hovmoller(&answer, data).unwrap()
+}
+
 fn is_told(svg: &str) {
     for text in [
         "Sea-surface temperature",
@@ -149,7 +156,10 @@ fn anomalies_are_bars_of_two_colours() {
     let svg = of_analysis(&analysis("anomaly", made)).unwrap();
     is_told(&svg);
     let bars = |colour: &str| svg.matches(&format!("fill=\"{colour}\"")).count();
-    assert_eq!((bars("#0072B2"), bars("#D55E00")), (4, 7));
+    // One is missing, and what is zero has no bar.
+    assert_eq!((bars("#0072B2"), bars("#D55E00")), (4, 6));
+    let marked = |text: &str| svg.contains(&format!("\n{text}\n"));
+    assert!(marked("−5.0") && marked("0.0") && marked("5.0"));
 }
 
 #[test]
@@ -164,7 +174,7 @@ fn bands_against_time_have_the_colours_of_the_quantity_and_a_bar_of_them() {
     let mut made = json!({"along": "lat", "band_deg": 30.0, "bounds_deg": [-180.0, -30.0, 180.0, 60.0],
         "step": "month", "earth": "wgs84", "coverage_basis": "cells", "notes": [],
         "bands": [band(-30.0), band(0.0), band(30.0)], "rows": rows});
-    let svg = of_hovmoller(&serde_json::from_value(cited(made.clone())).unwrap()).unwrap();
+    let svg = bands_of(made.clone());
     is_told(&svg);
     assert!(svg.contains("degrees north") && svg.contains("2002-01"));
     assert_eq!(svg.matches("fill=\"#D6D6D6\"").count(), 24);
@@ -172,7 +182,7 @@ fn bands_against_time_have_the_colours_of_the_quantity_and_a_bar_of_them() {
     made["region"] = json!("basins@1-0a1b2c3d:30 (north)");
     made["min_coverage_percent"] = json!(40.0);
     made["left_out_count"] = json!(24);
-    let svg = of_hovmoller(&serde_json::from_value(cited(made)).unwrap()).unwrap();
+    let svg = bands_of(made);
     assert!(svg.contains("degrees of basins@1-0a1b2c3d:30 (north) and steps"));
     assert!(svg.contains("coverage of less than 40 %"));
 }
@@ -187,11 +197,84 @@ fn the_whole_period_of_bands_is_a_profile_with_its_spread_broken_where_nothing_i
     ];
     let made = json!({"along": "lat", "band_deg": 30.0, "bounds_deg": [-180.0, -60.0, 180.0, 60.0],
         "step": "total", "earth": "wgs84", "coverage_basis": "cells", "notes": [], "bands": bands, "rows": rows});
-    let svg = of_hovmoller(&serde_json::from_value(cited(made)).unwrap()).unwrap();
+    let svg = bands_of(made);
     is_told(&svg);
     assert!(svg.contains("profile of latitude") && svg.contains("degrees north"));
     assert_eq!(svg.matches("<polygon").count(), 2);
     assert_eq!(svg.matches("<circle").count(), 3);
+}
+
+/// A month of which ten days hold data.
+#[test]
+fn the_axis_of_bands_ends_where_data_end() {
+    let (start, end) = month(0);
+    let row = json!({"start": start, "end": end, "means": [1.0], "coverage_percent": [30.0]});
+    let made = json!({"along": "lat", "band_deg": 30.0, "bounds_deg": [-180.0, 0.0, 180.0, 30.0],
+        "step": "month", "earth": "wgs84", "coverage_basis": "cells", "notes": [],
+        "bands": [{"low_deg": 0.0, "high_deg": 30.0, "area_m2": 1e12}], "rows": [row]});
+    let answer = serde_json::from_value(cited(made)).unwrap();
+    let until = |end: &str| {
+        let data = Period::new("2001".parse().unwrap(), end.parse().unwrap()).unwrap();
+        of_hovmoller(&answer, data).unwrap()
+    };
+    let svg = until("2001-01-11");
+    assert!(svg.contains("\n2001-01-11\n") && !svg.contains("\n2001-01-12\n"));
+    assert!(until("2001-02").contains("\n2001-01-31\n"));
+}
+
+fn statistics_of(names: &[(&str, &str)]) -> StatisticsAnswer {
+    let notes = names
+        .iter()
+        .map(|(name, unit)| json!({"name": name, "unit": unit, "what": "made by a test"}));
+    let row = |index: u32| {
+        let (start, end) = month(index);
+        let values = names
+            .iter()
+            .map(|(name, _)| ((*name).to_owned(), json!(index)));
+        json!({"start": start, "end": end, "mid": start, "values": Value::Object(values.collect()),
+            "coverage_percent": 100.0, "step_count": 1, "is_withheld": false})
+    };
+    let rows: Vec<Value> = (0..12).map(row).collect();
+    let made = json!({"kind": "area", "geometry": "global", "step": "month", "earth": "wgs84", "cells": "whole",
+        "statistics": notes.collect::<Vec<Value>>(), "coverage_basis": "sea", "size": 1e14, "size_unit": "m²",
+        "min_coverage_percent": 0.0, "ocean_source": null, "notes": [], "rows": rows});
+    serde_json::from_value(cited(made)).unwrap()
+}
+
+#[test]
+fn all_statistics_of_the_unit_are_drawn_and_others_named_and_too_many_refused() {
+    let names = ["mean", "min", "p10", "median", "p75", "p90", "p95", "max"];
+    let mut asked: Vec<(&str, &str)> = names.map(|name| (name, "°C")).to_vec();
+    asked.extend([("std", "°C"), ("count", "")]);
+    let svg = of_statistics(&statistics_of(&asked)).unwrap();
+    is_told(&svg);
+    for name in names {
+        assert!(svg.contains(&format!("\n{name}\n")), "{name} has a line");
+    }
+    let lines = svg.lines().filter(|line| line.starts_with("<circle"));
+    assert_eq!(lines.count(), 8 * 12);
+    assert!(svg.contains("not drawn, of another unit: count") && svg.contains("band: mean"));
+    // Without a mean there is no band that it could be.
+    let alone = of_statistics(&statistics_of(&[("std", "°C")])).unwrap();
+    assert!(alone.contains("\nstd\n") && !alone.contains("not drawn"));
+    asked.push(("p99", "°C"));
+    let refused = of_statistics(&statistics_of(&asked)).unwrap_err();
+    let refused = refused.to_string();
+    assert!(
+        refused.contains("colours for 8 statistics, and 9") && refused.contains("p99"),
+        "{refused}"
+    );
+}
+
+#[test]
+fn a_climatology_of_one_year_promises_no_spread() {
+    let row = |bin: u32| json!({"bin": "m", "mean": bin, "spread": null, "count": 1, "years": 1});
+    let rows: Vec<Value> = (0..12).map(row).collect();
+    let made = json!({"bins": "month", "base": "2001/2001", "rows": rows});
+    let svg = of_analysis(&analysis("climatology", made)).unwrap();
+    is_told(&svg);
+    assert!(svg.contains("no standard deviation") && !svg.contains("on either side"));
+    assert!(!svg.contains("<polygon"));
 }
 
 #[test]

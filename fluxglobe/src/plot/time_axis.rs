@@ -1,13 +1,20 @@
-//! Time along an axis: years, or months where there are few years, with round ones marked.
+//! Time along an axis: years, months where there are few years or days where there are few months, with round ones marked.
 
 use std::ops::Range;
 
 use contract::time::{Period, TimeMs};
 
+use super::marked::Marks;
+
 /// Years up to which months are marked.
 const MONTHS_UP_TO: f64 = 4.0;
+/// Days up to which days are marked.
+const DAYS_UP_TO: f64 = 62.0;
+const DAY_MS: i64 = 86_400_000;
 /// Most marks.
 const MOST: f64 = 12.0;
+/// Days between marks.
+const DAYS: [u32; 6] = [1, 2, 3, 5, 7, 10];
 /// Months between marks.
 const MONTHS: [u32; 4] = [1, 2, 3, 6];
 /// Years between marks.
@@ -20,27 +27,23 @@ pub(super) struct TimeAxis {
     per_year: f64,
     /// The ends, in its unit.
     pub(super) range: Range<f64>,
-    /// What is marked, in its unit.
-    pub(super) marks: Vec<f64>,
+    /// What is marked, in its unit, and its texts: `2000`, `2000-03` or `2000-03-15`.
+    pub(super) marks: Marks,
 }
 
 impl TimeAxis {
     pub(super) fn over(start: TimeMs, end: TimeMs) -> Self {
         let years = year_of(end) - year_of(start);
-        let (per_year, steps) = if years <= MONTHS_UP_TO {
-            (12.0, &MONTHS[..])
-        } else {
-            (1.0, &YEARS[..])
-        };
+        let per_year = if years <= MONTHS_UP_TO { 12.0 } else { 1.0 };
         let range = year_of(start) * per_year..year_of(end) * per_year;
-        let length = range.end - range.start;
-        let is_enough = |step: &&u32| length / f64::from(**step) <= MOST;
-        let step = f64::from(*steps.iter().find(is_enough).unwrap_or(&1000));
-        let first = (range.start / step - 1e-6).ceil() as i64;
-        let last = (range.end / step + 1e-6).floor() as i64;
+        let marks = if (end.ms() - start.ms()) as f64 <= DAYS_UP_TO * DAY_MS as f64 {
+            days(start, end, per_year)
+        } else {
+            units(&range, per_year)
+        };
         Self {
             per_year,
-            marks: (first..=last).map(|mark| mark as f64 * step).collect(),
+            marks: Marks::new(marks),
             range,
         }
     }
@@ -49,16 +52,46 @@ impl TimeAxis {
     pub(super) fn at(&self, time: TimeMs) -> f64 {
         year_of(time) * self.per_year
     }
+}
 
-    /// What a place is called: `2000`, or `2000-03`.
-    #[expect(clippy::trivially_copy_pass_by_ref, reason = "plotters asks so")]
-    pub(super) fn text(&self, place: &f64) -> String {
-        if self.per_year < 2.0 {
+/// The smallest step that makes few enough marks.
+fn step(length: f64, steps: &[u32]) -> u32 {
+    let is_enough = |step: &&u32| length / f64::from(**step) <= MOST;
+    *steps.iter().find(is_enough).unwrap_or(&1000)
+}
+
+/// Round months or years.
+fn units(range: &Range<f64>, per_year: f64) -> Vec<(f64, String)> {
+    let is_months = per_year > 1.0;
+    let steps = if is_months { &MONTHS[..] } else { &YEARS[..] };
+    let step = f64::from(step(range.end - range.start, steps));
+    let first = (range.start / step - 1e-6).ceil() as i64;
+    let last = (range.end / step + 1e-6).floor() as i64;
+    let places = (first..=last).map(|mark| mark as f64 * step);
+    let text = |place: f64| {
+        if !is_months {
             return format!("{place:.0}");
         }
         let months = place.round() as i64;
         format!("{}-{:02}", months.div_euclid(12), months.rem_euclid(12) + 1)
+    };
+    places.map(|place| (place, text(place))).collect()
+}
+
+/// Days from the first whole one on; the start where no day begins.
+fn days(start: TimeMs, end: TimeMs, per_year: f64) -> Vec<(f64, String)> {
+    let step = step((end.ms() - start.ms()) as f64 / DAY_MS as f64, &DAYS);
+    let first = start.ms().div_euclid(DAY_MS) + i64::from(start.ms().rem_euclid(DAY_MS) > 0);
+    let last = end.ms().div_euclid(DAY_MS);
+    let days = (first..=last).step_by(step as usize);
+    let instants = days.filter_map(|day| TimeMs::new(day * DAY_MS).ok());
+    let marks: Vec<(f64, String)> = instants
+        .map(|day| (year_of(day) * per_year, day.to_string()[..10].to_owned()))
+        .collect();
+    if marks.is_empty() {
+        return vec![(year_of(start) * per_year, start.to_string())];
     }
+    marks
 }
 
 /// The year of an instant, months of equal length, so that each begins at a twelfth.
@@ -80,20 +113,36 @@ mod tests {
 
     #[test]
     fn few_years_are_marked_by_month_and_many_by_round_years() {
-        let texts =
-            |axis: &TimeAxis| -> Vec<String> { axis.marks.iter().map(|m| axis.text(m)).collect() };
         let year = axis("2000", "2001");
-        assert_eq!(texts(&year)[..2], ["2000-01", "2000-02"]);
-        assert_eq!(texts(&year).last().unwrap(), "2001-01");
+        assert_eq!(year.marks.texts()[..2], ["2000-01", "2000-02"]);
+        assert_eq!(year.marks.texts().last(), Some(&"2001-01"));
         let sixteen = axis("2002-07", "2018-07");
         assert_eq!(
-            texts(&sixteen),
+            sixteen.marks.texts(),
             [
                 "2004", "2006", "2008", "2010", "2012", "2014", "2016", "2018"
             ]
         );
-        let day = axis("2000-03-04", "2000-03-05");
-        assert!(day.marks.is_empty() && day.range.start < day.range.end);
+        let months = axis("2000-01", "2000-04");
+        assert_eq!(
+            months.marks.texts(),
+            ["2000-01", "2000-02", "2000-03", "2000-04"]
+        );
         assert!((year.at("2000-04".parse().unwrap()) - (2000.0 * 12.0 + 3.0)).abs() < 1e-9);
+    }
+
+    #[test]
+    fn few_days_are_marked_by_day_and_whatever_is_shorter_by_its_start() {
+        let ten = axis("2009-01-01", "2009-01-11");
+        let texts = ten.marks.texts();
+        assert_eq!((texts.len(), texts[0]), (11, "2009-01-01"));
+        assert_eq!(texts.last(), Some(&"2009-01-11"));
+        let across = axis("2009-01-30T12:00:00Z", "2009-02-28");
+        let texts = across.marks.texts();
+        assert_eq!(texts[..3], ["2009-01-31", "2009-02-03", "2009-02-06"]);
+        assert!(texts.len() <= 13, "{texts:?}");
+        let hours = axis("2000-03-04T01:00:00Z", "2000-03-04T02:00:00Z");
+        assert_eq!(hours.marks.texts(), ["2000-03-04T01:00:00Z"]);
+        assert!(hours.range.start < hours.range.end);
     }
 }

@@ -40,9 +40,8 @@ pub(crate) async fn run(settings: &Settings, options: BenchQuality) -> Result<()
     };
     bounds.validate()?;
     let report = measured(settings, &options, &bounds).await?;
-    if let Some(path) = &options.plot {
-        let svg = plot::svg(&report.scenes)?;
-        std::fs::write(path, svg).with_context(|| format!("cannot write {}", path.display()))?;
+    if let Some(file) = &options.plot {
+        crate::plot::write(file, &plot::svg(&report.scenes)?)?;
     }
     if options.json {
         progress::result(&serde_json::to_string_pretty(&report)?)?;

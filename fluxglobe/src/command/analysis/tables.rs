@@ -11,6 +11,8 @@ use crate::progress;
 
 /// Numbers of a row of bands that are shown on one line.
 const BANDS_SHOWN: usize = 12;
+/// Chances below this are told to be.
+const SMALLEST_CHANCE: f64 = 1e-300;
 /// Square metres in a million square kilometres.
 const M2_PER_MILLION_KM2: f64 = 1e12;
 
@@ -77,6 +79,8 @@ fn chance(p_value: Option<f64>) -> String {
     match p_value {
         None => "-".to_owned(),
         Some(p) if p >= 1e-4 => format!("{p:.4}"),
+        // Below some 1e-308 numbers lose their figures, and are zero in the end, which no chance is.
+        Some(p) if p < SMALLEST_CHANCE => format!("< {SMALLEST_CHANCE:e}"),
         Some(p) => format!("{p:.1e}"),
     }
 }
@@ -235,7 +239,10 @@ pub(super) fn of_difference(answer: &Difference) -> String {
         vec![
             "difference".to_owned(),
             format!("± {} (1σ)", number(answer.standard_error)),
-            format!("p = {}", chance(answer.p_value)),
+            match chance(answer.p_value) {
+                less if less.starts_with('<') => format!("p {less}"),
+                p => format!("p = {p}"),
+            },
             String::new(),
             number(answer.difference),
             String::new(),
@@ -290,4 +297,15 @@ pub(super) fn of_hovmoller(answer: &Hovmoller) -> String {
         return table;
     }
     format!("{table}\n one band in {every} is shown; --json has all")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_chance_is_zero() {
+        let texts = [None, Some(0.04), Some(2e-7), Some(1e-299), Some(0.0)].map(chance);
+        assert_eq!(texts, ["-", "0.0400", "2.0e-7", "1.0e-299", "< 1e-300"]);
+    }
 }

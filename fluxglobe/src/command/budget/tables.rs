@@ -4,7 +4,7 @@ use comfy_table::presets::NOTHING;
 use comfy_table::{CellAlignment, Table};
 use contract::budget::{BudgetAnswer, BudgetHistory, BudgetRow, RowDraws};
 
-use super::M2_PER_MILLION_KM2;
+use super::million_km2;
 use crate::progress;
 
 /// Columns of days and words, which stand to the left.
@@ -138,19 +138,13 @@ impl Columns {
         }
         cells.extend([
             format!("{:.1}", row.coverage_percent),
-            format!("{:.3}", row.ocean_with_data_m2 / M2_PER_MILLION_KM2),
+            million_km2(row.ocean_with_data_m2),
             optional(row.gap_tg),
-            format!("{:.3}", row.gap_area_m2 / M2_PER_MILLION_KM2),
+            million_km2(row.gap_area_m2),
         ]);
         if let Some(completeness) = &row.completeness {
-            cells.push(format!(
-                "{:.3}",
-                completeness.complete_m2 / M2_PER_MILLION_KM2
-            ));
-            cells.push(format!(
-                "{:.3}",
-                completeness.incomplete_m2 / M2_PER_MILLION_KM2
-            ));
+            cells.push(million_km2(completeness.complete_m2));
+            cells.push(million_km2(completeness.incomplete_m2));
             let percent = completeness.percent();
             cells.push(percent.map_or("no data".to_owned(), |percent| format!("{percent:.1}")));
         }
