@@ -117,7 +117,7 @@ impl Conversion {
             .whole
             .as_ref()
             .and_then(WholeNumbers::said)
-            .map(plan::line);
+            .map(crate::plan::line);
         if let Some(line) = said.filter(|line| !plan.assumptions.contains(line)) {
             plan.assumptions.push(line);
         }

@@ -54,6 +54,7 @@ impl ForeignError {
             reason: self.to_string(),
             place: place.into(),
             cause: self.cause,
+            is_absent: self.is_absent,
         }
     }
 }

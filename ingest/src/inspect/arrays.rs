@@ -19,6 +19,9 @@ use crate::error::{IngestError, Rejection, Stop};
 /// Which index is read of dimensions beside time and the map, by their names.
 pub(crate) type Indexes = BTreeMap<String, u64>;
 
+/// Attributes that hold stored numbers which stand for no data.
+const FILLS: [&str; 2] = ["_FillValue", "missing_value"];
+
 /// Arrays that are read.
 #[derive(Clone)]
 pub(crate) struct Arrays {
