@@ -127,6 +127,12 @@ mod tests {
         }
         let (file, mut variable) = file(Some(MapStatistic::Max), "up");
         assert_eq!(of_file(&file, &variable), None);
+        // Nor is the cube of it that is attached.
+        let text = file.attributes.text(Description::ATTRIBUTE).unwrap();
+        let said: Value = serde_json::from_str(text).unwrap();
+        let attributes = Map::from_iter([(Description::ATTRIBUTE.to_owned(), said)]);
+        assert!(read(&attributes, "carbon_flux").is_some());
+        assert!(description(&attributes, "carbon_flux").is_none());
         let told = note(&file, &variable).unwrap();
         assert!(told.contains("statistic max"), "{told}");
         variable.name = "another".to_owned();
