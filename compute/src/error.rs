@@ -21,12 +21,20 @@ pub enum ComputeError {
         known: Vec<ProductId>,
     },
     /// A budget is asked of something that is no flux of carbon.
-    #[error("{product} is no flux of carbon, nor accumulated from one, but {}: only a carbon flux has a budget", .quantity.title())]
+    #[error("{product} is no flux of carbon, nor accumulated from one, but {}", .quantity.without_budget())]
     NotAFlux {
         /// Product.
         product: ProductId,
         /// What it measures.
         quantity: Quantity,
+    },
+    /// A product is held against no observation.
+    #[error(
+        "there is no observation to compare {product} with: none is what was asked for; `fluxglobe observations list` tells which there are"
+    )]
+    NothingToCompare {
+        /// Product.
+        product: ProductId,
     },
     /// A budget is asked of an extreme of a flux.
     #[error(
@@ -201,6 +209,7 @@ impl ComputeError {
             Self::UnknownProduct { .. } => ErrorClass::NotFound,
             Self::NotAFlux { .. }
             | Self::NotSummed { .. }
+            | Self::NothingToCompare { .. }
             | Self::RegionOutside { .. }
             | Self::Region { .. }
             | Self::OceanShares { .. }

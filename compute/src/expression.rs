@@ -16,7 +16,7 @@ use std::sync::{Arc, LazyLock};
 
 use datafusion::arrow::array::{Array as _, ArrayRef, AsArray as _, Float64Array, RecordBatch};
 use datafusion::arrow::datatypes::{DataType, Field, Float64Type, Schema, SchemaRef};
-use datafusion::common::{DFSchema, DataFusionError};
+use datafusion::common::{DFSchema, DataFusionError, SchemaError};
 use datafusion::execution::FunctionRegistry as _;
 use datafusion::execution::session_state::{SessionState, SessionStateBuilder};
 use datafusion::logical_expr::ScalarUDF;
@@ -87,7 +87,8 @@ impl Expression {
         let schema = Arc::new(Schema::new(inputs.iter().map(field).collect::<Vec<_>>()));
         let in_words = |e: DataFusionError| in_words(&e);
         let names = DFSchema::try_from(Arc::clone(&schema)).map_err(in_words)?;
-        let parsed = STATE.create_logical_expr(text, &names).map_err(in_words)?;
+        let parsed = STATE.create_logical_expr(text, &names);
+        let parsed = parsed.map_err(|e| unknown_name(&e, inputs).unwrap_or_else(|| in_words(e)))?;
         let parsed = rewrite::numbers(parsed).map_err(in_words)?;
         let units = inputs.iter().cloned().collect();
         let unit = match typed::typed(&parsed, &units)? {
@@ -221,6 +222,22 @@ impl Expression {
 }
 
 /// What the engine says, in one line.
+/// What is wrong with a name that is no input, if that is what is wrong.
+fn unknown_name(error: &DataFusionError, inputs: &[(String, Unit)]) -> Option<String> {
+    let DataFusionError::SchemaError(schema, _trace) = error.find_root() else {
+        return None;
+    };
+    let SchemaError::FieldNotFound { field, .. } = &**schema else {
+        return None;
+    };
+    let names: Vec<&str> = inputs.iter().map(|(name, _unit)| name.as_str()).collect();
+    let there = match names.as_slice() {
+        [] => "there are none".to_owned(),
+        names => format!("inputs are {}", names.join(", ")),
+    };
+    Some(format!("{:?} is not an input; {there}", field.name))
+}
+
 fn in_words(error: &DataFusionError) -> String {
     let text = error.strip_backtrace();
     text.lines().next().unwrap_or_default().to_owned()

@@ -174,10 +174,9 @@ fn one_property(manifest: &Manifest, observations: &[Observation]) -> Result<Str
         ))
     };
     let Some(first) = observations.first() else {
-        return Err(invalid(
-            "none",
-            "the filter finds no observation; widen it".to_owned(),
-        ));
+        return Err(ComputeError::NothingToCompare {
+            product: manifest.product.clone(),
+        });
     };
     if let Some(other) = observations.iter().find(|o| o.property != first.property) {
         let reason = format!(

@@ -93,7 +93,7 @@ impl BudgetQuery {
                 manifest.steps_inside(self.from, self.to)
             }
             other => {
-                let reason = format!("it is {}: only a carbon flux has a budget", other.title());
+                let reason = format!("it is {}", other.without_budget());
                 let name = manifest.product.as_str();
                 Err(ContractError::invalid("product", name, reason))
             }

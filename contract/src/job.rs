@@ -257,22 +257,28 @@ impl View {
     /// # Errors
     /// The limit that is broken, with what would be valid.
     pub fn validate(&self) -> Result<(), ContractError> {
-        let bad = |reason: &str| Err(ContractError::invalid("view", &format!("{self:?}"), reason));
-        if self
-            .size_px()
-            .iter()
-            .any(|px| !(1..=MAX_IMAGE_PX).contains(px))
-        {
-            return bad("pictures are 1 to 7680 pixels wide and high");
+        let bad =
+            |what, text: String, reason: &str| Err(ContractError::invalid(what, &text, reason));
+        let names = match self {
+            Self::Tile { .. } => ["size"; 2],
+            Self::Globe { .. } => ["width", "height"],
+        };
+        for (what, px) in names.into_iter().zip(self.size_px()) {
+            if !(1..=MAX_IMAGE_PX).contains(&px) {
+                let reason = "pictures are 1 to 7680 pixels wide and high";
+                return bad(what, px.to_string(), reason);
+            }
         }
         let [width, height] = self.size_px().map(u64::from);
         if width * height > MAX_PIXELS {
-            return bad("pictures have at most as many pixels as 7680 x 4320");
+            let reason = "pictures have at most as many pixels as 7680 x 4320";
+            return bad("size", format!("{width}x{height}"), reason);
         }
         match *self {
             Self::Tile { tile, size_px } => {
                 if size_px != 256 && size_px != 512 {
-                    return bad("tiles are 256 or 512 pixels a side");
+                    let reason = "tiles are 256 or 512 pixels a side";
+                    return bad("size", size_px.to_string(), reason);
                 }
                 Tile::new(tile.z, tile.x, tile.y).map(|_inside| ())
             }
@@ -687,6 +693,19 @@ mod tests {
             height_px: 10,
             angles: crate::camera::CameraAngles::NADIR,
         };
+        let told = |view: View| view.validate().unwrap_err().to_string();
+        let wide = told(globe(1e6, 99_999));
+        let expected = "width \"99999\" is not valid: pictures are 1 to 7680";
+        assert!(wide.starts_with(expected), "{wide}");
+        let square = told(View::Globe {
+            lon_deg: 0.0,
+            lat_deg: 0.0,
+            height_m: 1e6,
+            width_px: MAX_IMAGE_PX,
+            height_px: MAX_IMAGE_PX,
+            angles: crate::camera::CameraAngles::NADIR,
+        });
+        assert!(square.starts_with("size \"7680x7680\""), "{square}");
         let broken: [fn(&mut RenderJob); 18] = [
             |j| j.grid.rows = u32::MAX,
             |j| j.style.sun.subsolar = Some(subsolar(f64::NAN)),

@@ -186,6 +186,18 @@ impl Quantity {
         }
     }
 
+    /// Why it has no budget, of what is no carbon; an open one may be a flux all the same, of which files did not say enough.
+    pub fn without_budget(self) -> String {
+        const ONLY: &str = "only a carbon flux has a budget";
+        match self {
+            Self::Open(_) => format!(
+                "{:?}, which is not known as a carbon flux: {ONLY}; if it is one, land its files anew with a standard_name or an attribute positive that says its direction, or by a profile with quantity = \"carbon_flux\"",
+                self.title()
+            ),
+            known => format!("{}: {ONLY}", known.title()),
+        }
+    }
+
     /// Values that can be true, stored unit; anything outside is refused or masked at ingest.
     pub fn plausible(self) -> std::ops::RangeInclusive<f64> {
         match self {
@@ -304,6 +316,22 @@ mod tests {
         let joined = of("1", [0.0, 5.0]).joined(of("1", [-2.0, 1.0]));
         assert_eq!(joined, Some(of("1", [-2.0, 5.0])));
         assert_eq!(of("1", [0.0, 5.0]).joined(of("m", [0.0, 5.0])), None);
+    }
+
+    #[test]
+    fn what_is_not_known_as_a_flux_is_told_how_it_could_be() {
+        let open = Quantity::open("air_sea_co2_flux", "mol m-2 s-1", "air-sea CO2 flux");
+        let told = open.unwrap().without_budget();
+        for part in [
+            "\"air-sea CO2 flux\", which is not known as a carbon flux",
+            "only a carbon flux has a budget",
+            "standard_name",
+            "quantity = \"carbon_flux\"",
+        ] {
+            assert!(told.contains(part), "{told}");
+        }
+        let salinity = Quantity::Salinity.without_budget();
+        assert_eq!(salinity, "Salinity: only a carbon flux has a budget");
     }
 
     #[test]

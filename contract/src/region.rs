@@ -121,7 +121,7 @@ impl std::str::FromStr for Region {
         }
         let names: Vec<_> = NAMED_REGIONS.iter().map(|r| r.name).collect();
         let reason = format!(
-            "west,south,east,north in degrees, GeoJSON, POLYGON or MULTIPOLYGON text, or one of {}",
+            "west,south,east,north in degrees, GeoJSON, POLYGON or MULTIPOLYGON text, the cells of a mask that have a code as MASK:CODE, or one of {}",
             names.join(", ")
         );
         Err(ContractError::invalid("region", s, reason))

@@ -147,6 +147,10 @@ pub fn of_values(description: &Description) -> Map<String, Value> {
     if let Some(name) = standard_name(description) {
         attributes.insert("standard_name".to_owned(), name.into());
     }
+    // The tables of CMIP have it of fluxes, and so it is what programs look for; the conventions have no name that says it.
+    if quantity == Quantity::CarbonFlux {
+        attributes.insert("positive".to_owned(), "up".into());
+    }
     if let Some([below, above]) = quantity.ends() {
         comments.push(format!("below zero the {below}, above it the {above}"));
     }
@@ -339,6 +343,22 @@ mod tests {
             assert_eq!(of(plain, statistic), None);
         }
         assert_eq!(of(named, Some(MapStatistic::Max)), None);
+    }
+
+    /// The conventions have no name for a flux out of the sea, and who reads a file is told all the same which way it is.
+    #[test]
+    fn a_flux_says_that_it_is_positive_upwards_and_nothing_else_does() {
+        let positive = |quantity| {
+            let values = of_values(&Description {
+                quantity,
+                statistic: None,
+                ..crate::description::tests::description()
+            });
+            values.get("positive").cloned()
+        };
+        assert_eq!(positive(Quantity::CarbonFlux), Some(json!("up")));
+        let others = Quantity::ALL.into_iter().filter_map(positive);
+        assert_eq!(others.count(), 1);
     }
 
     /// A map of highest values is none of means, whatever its quantity.

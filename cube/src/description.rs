@@ -45,6 +45,9 @@ pub struct Description {
 }
 
 impl Description {
+    /// The attribute of the group, or of an exported file, that holds it.
+    pub const ATTRIBUTE: &'static str = ATTRIBUTE;
+
     /// The description of a version of a product.
     pub fn of(manifest: &Manifest) -> Self {
         Self::named(manifest, manifest.id())

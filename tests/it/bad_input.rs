@@ -206,6 +206,47 @@ fn commands_say_what_there_is() {
     }
 }
 
+/// A slip, or the command for something else, is told with what was meant.
+#[test]
+fn what_is_no_such_thing_is_told_with_what_there_is_and_which_command_takes_it() {
+    let data = tempfile::tempdir().unwrap();
+    let path = |name: &str| data.path().join(name).to_str().unwrap().to_owned();
+    let (zarr, plain) = (path("flux.zarr"), path("plain"));
+    for folder in [&zarr, &plain] {
+        std::fs::create_dir(folder).unwrap();
+    }
+    std::fs::write(path("flux.zarr/zarr.json"), "{}").unwrap();
+    let file = flux_files().swap_remove(0);
+    let file = file.to_str().unwrap();
+    let fails = |words: &[&str], parts: &[&str]| {
+        let talk = program::fail(data.path(), words).unwrap();
+        for part in parts {
+            assert!(talk.contains(part), "{words:?}: {talk}");
+        }
+    };
+    fails(&["ingest", &zarr], &["is a folder", "`fluxglobe attach`"]);
+    fails(&["ingest", &plain], &["is a folder", "the files in it"]);
+    let attach = ["attach", file, "--variable", "x"];
+    fails(&attach, &["it is a file", "`fluxglobe ingest`"]);
+    let profile = ["ingest", file, "--profile", "no-profile"];
+    fails(&profile, &["is none of", "takahashi09-flux, ", " more"]);
+    let dataset = ["observations", "query", "--dataset", "none"];
+    fails(&dataset, &["there is no dataset none"]);
+
+    let of = |region| {
+        let words = ["budget", "--product", "takahashi09-flux", "--region"];
+        [&words[..], &[region, "--json"]].concat()
+    };
+    let talk = program::fail(demo_data(), &of("north-atlantic")).unwrap();
+    for part in ["global", "MASK:CODE", ".geojson"] {
+        assert!(talk.contains(part), "{talk}");
+    }
+    // Capitals are as small letters, and the answer has the one name.
+    let [small, large] =
+        ["14n-50n", "14N-50N"].map(|region| program::json(demo_data(), &of(region)).unwrap());
+    assert_eq!(small, large);
+}
+
 #[test]
 fn bad_requests_get_their_status_and_a_reason() {
     let data = demo_data();

@@ -1,6 +1,7 @@
 //! Products that were exported, opened by others: xarray finds the values, times and places of the files they came from.
 
-use std::ffi::OsStr;
+use std::collections::BTreeSet;
+use std::ffi::{OsStr, OsString};
 use std::path::Path;
 use std::process::Command;
 
@@ -98,6 +99,62 @@ fn icechunk_finds_the_same_in_the_store_itself_and_in_a_copy() {
     // The comparison sees another product.
     let error = compared_by(&python, cubes.join("takahashi09-flux-accumulated")).unwrap_err();
     assert!(error.contains("carbon_flux"), "{error}");
+}
+
+/// Names of the stored fields of a product: digests of values, places and times.
+fn fields(data: &Path, product: &str) -> BTreeSet<OsString> {
+    let folder = data.join("objects/frames").join(product);
+    let entries = std::fs::read_dir(folder).unwrap();
+    entries.map(|entry| entry.unwrap().file_name()).collect()
+}
+
+/// What `fluxglobe products` says that a product measures.
+fn quantity(data: &Path, product: &str) -> Value {
+    let listed = program::json(data, &["products", "--json"]).unwrap();
+    let own = listed
+        .as_array()
+        .unwrap()
+        .iter()
+        .find(|one| one["product"] == product);
+    own.unwrap()["quantity"].clone()
+}
+
+#[test]
+fn what_was_exported_as_netcdf_lands_as_what_it_was_with_its_values_and_its_budget() {
+    let folder = tempfile::tempdir().unwrap();
+    let data = folder.path().join("data");
+    for (product, landed) in [
+        ("takahashi09-flux", "carbon-flux"),
+        ("wind-2010", "wind-speed"),
+    ] {
+        // No profile is for a file of this name.
+        let file = folder.path().join(format!("exported-{landed}.nc"));
+        let file = file.to_str().unwrap();
+        program::succeed(demo_data(), &["export", product, "--to", "netcdf", file]).unwrap();
+        program::succeed(&data, &["ingest", file]).unwrap();
+        assert_eq!(quantity(&data, landed), quantity(demo_data(), product));
+        let (before, after) = (fields(demo_data(), product), fields(&data, landed));
+        assert_eq!(after.len(), 12, "{product}");
+        assert!(after.is_subset(&before), "{product} has other values");
+    }
+    assert_eq!(quantity(&data, "carbon-flux"), "carbon_flux");
+    let rows = |data: &Path, product: &str| {
+        let words = ["budget", "--product", product, "--step", "month", "--json"];
+        program::json(data, &words).unwrap()["rows"].clone()
+    };
+    let (before, after) = (
+        rows(demo_data(), "takahashi09-flux"),
+        rows(&data, "carbon-flux"),
+    );
+    for (before, after) in before
+        .as_array()
+        .unwrap()
+        .iter()
+        .zip(after.as_array().unwrap())
+    {
+        assert!(before["budget_tg"].is_number(), "{before}");
+        assert_eq!(before["budget_tg"], after["budget_tg"]);
+    }
 }
 
 #[test]

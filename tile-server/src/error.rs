@@ -7,6 +7,7 @@ use axum::Json;
 use axum::http::{HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use contract::ContractError;
+use contract::product::ProductId;
 use legend::LegendError;
 use serde::Serialize;
 use storage::StorageError;
@@ -24,6 +25,19 @@ const RETRY_UNAVAILABLE_S: u16 = 5;
 pub(crate) struct Refusal {
     /// What failed, on which object, and what would be valid; one line for people.
     error: String,
+}
+
+/// Most names that a refusal lists.
+const NAMES: usize = 20;
+
+/// Names with commas, the first of many.
+fn names(all: &[ProductId]) -> String {
+    let shown: Vec<&str> = all.iter().take(NAMES).map(ProductId::as_str).collect();
+    match all.len() - shown.len() {
+        _ if all.is_empty() => "none".to_owned(),
+        0 => shown.join(", "),
+        more => format!("{} and {more} more", shown.join(", ")),
+    }
 }
 
 /// Why a request has no answer.
@@ -68,7 +82,7 @@ pub enum ServerError {
     )]
     NoVector { product: String },
     /// Nothing at the address.
-    #[error("there is nothing at this address")]
+    #[error("there is nothing at this address; /api/openapi.json describes those there are")]
     UnknownAddress,
     /// The value has none of the bytes that are asked for.
     #[error("there are {length} bytes here, and none of those in the header Range")]
@@ -76,6 +90,12 @@ pub enum ServerError {
     /// This server has no observations.
     #[error("there are no observations here")]
     NoObservations,
+    /// No observations of this data set.
+    #[error("there is no data set {:?}; there are {}", .name.as_str(), names(.known))]
+    UnknownDataset {
+        name: ProductId,
+        known: Vec<ProductId>,
+    },
     /// More viewers wait for news than are served.
     #[error("too many viewers wait for news; please try again later")]
     TooManyListeners,
@@ -162,7 +182,8 @@ impl ServerError {
             | Self::Attached { .. }
             | Self::UnknownMode { .. }
             | Self::UnknownAddress
-            | Self::NoObservations => StatusCode::NOT_FOUND,
+            | Self::NoObservations
+            | Self::UnknownDataset { .. } => StatusCode::NOT_FOUND,
             Self::ReadOnly | Self::AskedOnly => StatusCode::METHOD_NOT_ALLOWED,
             Self::NoGeoJson => StatusCode::UNSUPPORTED_MEDIA_TYPE,
             Self::Unchanged => StatusCode::PRECONDITION_FAILED,

@@ -137,7 +137,7 @@ impl Modify for SentAlong {
     }
 }
 
-/// How an operation may be refused.
+/// How an operation may be refused, or answered that a copy is right.
 fn refusals(operation: &Operation) -> Vec<(&'static str, Response)> {
     let parameters = operation.parameters.as_deref().unwrap_or_default();
     let takes = |place: &ParameterIn| {
@@ -156,6 +156,11 @@ fn refusals(operation: &Operation) -> Vec<(&'static str, Response)> {
         ),
         ("504", refusal("The answer took too long", true)),
     ];
+    if operation.request_body.is_none() && takes(&ParameterIn::Path) {
+        let text = "The copy that `If-None-Match` names is still right";
+        let unchanged = ResponseBuilder::new().description(text).build();
+        all.push(("304", unchanged));
+    }
     if operation.request_body.is_some() {
         let text = "The answer is still the one whose tag `If-None-Match` names";
         all.push(("412", refusal(text, false)));

@@ -143,7 +143,7 @@ fn mixed_units_and_whatever_is_no_arithmetic_are_refused_with_the_reason() {
             "CASE WHEN abs(sst - unit(280, 'K')) > unit(2, 'degC') THEN sst END",
             "may be a temperature",
         ),
-        ("nobody * 2", "nobody"),
+        ("nobody * 2", "\"nobody\" is not an input; inputs are "),
         ("sin(ice)", "the function sin is not one of"),
         ("ice % 2", "operator %"),
         ("CAST(ice AS INT)", "not understood"),

@@ -154,6 +154,8 @@ async fn apples_are_not_compared_with_pears() {
             .await
             .unwrap_err();
         assert_eq!(error.class(), ErrorClass::BadRequest, "{error}");
+        let is_none = error.to_string().contains("there is no observation to");
+        assert_eq!(is_none, observations.is_empty(), "{error}");
     }
     assert!(
         matchup(&store, &manifest, &[good], TimeMatch::Nearest)

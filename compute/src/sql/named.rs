@@ -51,9 +51,33 @@ impl Named {
         if let Some(manifest) = self.manifest(engine).await? {
             return Ok(manifest);
         }
+        self.check_version(engine).await?;
         Err(ComputeError::UnknownProduct {
             product: self.product.to_string(),
             known: manifests::products(engine.store()).await?,
+        })
+    }
+
+    /// # Errors
+    /// There is the product, and not the version of it.
+    pub(super) async fn check_version(&self, engine: &Engine) -> Result<(), ComputeError> {
+        let version = match (self.number, &self.digest) {
+            (Some(number), Some(digest)) => format!("{number}-{digest}"),
+            (Some(number), None) => number.to_string(),
+            (None, _) => return Ok(()),
+        };
+        let Some(newest) = manifests::latest(engine.store(), &self.product).await? else {
+            return Ok(());
+        };
+        let newest = match &self.digest {
+            Some(_) => newest.id().to_string(),
+            None => newest.number.to_string(),
+        };
+        Err(ComputeError::Sql {
+            reason: format!(
+                "{} has no version {version}; the newest is {newest}",
+                self.product
+            ),
         })
     }
 

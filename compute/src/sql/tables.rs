@@ -59,6 +59,9 @@ impl Tables {
             return Ok(None);
         };
         let manifest = named.manifest(&self.engine).await?;
+        if manifest.is_none() {
+            named.check_version(&self.engine).await?;
+        }
         let table = |manifest| -> Arc<dyn TableProvider> {
             Arc::new(ProductTable::new(Version::new(&self.engine, manifest)))
         };

@@ -361,7 +361,18 @@ const REFUSED: &[(&str, &str)] = &[
         "SELECT * FROM atlantis",
         "table 'fluxglobe.public.atlantis' not found; products are sst-test",
     ),
-    ("SELECT * FROM \"sst-test@2\"", "not found"),
+    (
+        "SELECT * FROM \"sst-test@2\"",
+        "sst-test has no version 2; the newest is 1",
+    ),
+    (
+        "SELECT * FROM \"sst-test@1-00000000\"",
+        "sst-test has no version 1-00000000; the newest is sst-test@1-",
+    ),
+    (
+        "SELECT * FROM \"atlantis@2\"",
+        "not found; products are sst-test",
+    ),
     ("SELECT depth FROM sst_test", "depth"),
     ("CHOOSE 1", "CHOOSE"),
     ("SELECT repeat('x', 2000000000)", "repeat is left out"),
@@ -550,7 +561,11 @@ async fn a_version_is_named_and_one_question_reads_one_version() {
     assert_eq!(steps("\"sst_test@2\"").await, "12");
     assert_eq!(steps(&format!("\"{}\"", second.id())).await, "12");
     let wrong = ask(&sql, "SELECT 1 FROM \"sst-test@2-00000000\"").await;
-    assert!(wrong.unwrap_err().to_string().contains("not found"));
+    let wrong = wrong.unwrap_err().to_string();
+    assert!(
+        wrong.contains("sst-test has no version 2-00000000; the newest is sst-test@2-"),
+        "{wrong}"
+    );
     let listed = "SELECT name, version, quantity, unit, steps, first, last, rows, cols, west, east FROM products";
     let row = "sst-test 2 sea_surface_temperature K 12 2010-01-01T00:00:00Z 2011-01-01T00:00:00Z 130 150 160.0 235.0";
     let row: Vec<&str> = row.split(' ').collect();

@@ -19,6 +19,10 @@ impl std::str::FromStr for AskedRegion {
 
     /// Parses what [`Region`] does.
     fn from_str(s: &str) -> Result<Self, Self::Err> {
+        if let Some(named) = NamedRegion::find(s) {
+            let (region, name) = (named.region(), named.name.to_owned());
+            return Ok(Self { region, name });
+        }
         let region: Region = s.parse()?;
         let name = match region {
             Region::Box {
@@ -26,7 +30,7 @@ impl std::str::FromStr for AskedRegion {
                 south,
                 east,
                 north,
-            } if NamedRegion::find(s).is_none() => [west, south, east, north]
+            } => [west, south, east, north]
                 .map(|edge| rounded_deg(edge).to_string())
                 .join(","),
             _ => geometry_text::name(s),
@@ -43,6 +47,8 @@ mod tests {
     fn a_box_is_called_by_its_edges_and_all_else_as_it_is_written() {
         for (asked, name) in [
             ("14n-50n", "14n-50n"),
+            ("14N-50N", "14n-50n"),
+            ("Global", "global"),
             ("global", "global"),
             ("170,-10,-170,10", "170,-10,190,10"),
             ("POLYGON((0 0,1 0,0 1,0 0))", "POLYGON((0 0,1 0,0 1,0 0))"),

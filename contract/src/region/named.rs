@@ -84,9 +84,11 @@ const fn boxed(name: &'static str, title: &'static str, bounds_deg: [f64; 4]) ->
 }
 
 impl NamedRegion {
-    /// The named region, if there is one.
+    /// The named region, if there is one; capitals are as small letters.
     pub fn find(name: &str) -> Option<&'static Self> {
-        NAMED_REGIONS.iter().find(|region| region.name == name)
+        NAMED_REGIONS
+            .iter()
+            .find(|region| region.name.eq_ignore_ascii_case(name))
     }
 
     /// Its shape.

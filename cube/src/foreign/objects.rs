@@ -59,6 +59,10 @@ impl StoredObjects {
         let folder = location.strip_prefix("file://").unwrap_or(location);
         let is_folder = !folder.contains("://");
         // Opening a folder would make it.
+        if is_folder && FilePath::new(folder).is_file() {
+            let reason = "it is a file and no folder of a Zarr or Icechunk store; files are landed with `fluxglobe ingest`";
+            return Err(ForeignError::refused(location, reason));
+        }
         if is_folder && !FilePath::new(folder).is_dir() {
             return Err(ForeignError::refused(location, "there is no such folder"));
         }

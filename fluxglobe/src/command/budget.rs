@@ -6,8 +6,9 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
-use anyhow::{Result, bail};
+use anyhow::{Result, anyhow, bail};
 use compute::region::{file, mask};
+use contract::ContractError;
 use contract::budget::{AsOf, BudgetAnswer, BudgetHistory, BudgetQuery, BudgetRow, BudgetWishes};
 use contract::manifest::{AskedVersion, Manifest};
 use contract::product::ProductId;
@@ -233,7 +234,16 @@ pub(crate) fn region(text: &str) -> Result<AskedRegion> {
         let (region, name) = (file::read(Path::new(text))?, text.to_owned());
         Ok(AskedRegion { region, name })
     } else {
-        Ok(text.parse()?)
+        let parsed: Result<AskedRegion, ContractError> = text.parse();
+        // What cannot be meant for a geometry may be a file whose ending is not known, or a name with a slip.
+        let is_name = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_' | '.' | '/');
+        parsed.map_err(|error| {
+            if !text.chars().all(is_name) {
+                return error.into();
+            }
+            let endings = file::ENDINGS.join(", .");
+            anyhow!("{error}; or the name of a file that ends in .{endings}")
+        })
     }
 }
 

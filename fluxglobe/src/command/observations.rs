@@ -1,6 +1,8 @@
 //! `fluxglobe observations`: which platforms there are, what they measured, and how a product compares with it.
 
-use anyhow::{Result, bail};
+use std::collections::BTreeSet;
+
+use anyhow::{Context as _, Result, bail};
 use comfy_table::presets::NOTHING;
 use comfy_table::{CellAlignment, Table};
 use compute::matchup::{self, LeftOut, TimeMatch};
@@ -38,6 +40,9 @@ async fn list(settings: &Settings, asked: &ObservationsAsked) -> Result<()> {
     let objects = deployment::store(settings)?;
     let store = observations::open(&asked.store, &objects)?;
     let platforms = store.platforms(&filter(asked)?).await?;
+    if platforms.is_empty() {
+        check_dataset(store.as_ref(), asked).await?;
+    }
     let warnings = masked(&objects, asked).await?;
     let warn = || warnings.iter().for_each(|line| progress::say(line));
     if asked.json {
@@ -80,6 +85,41 @@ async fn list(settings: &Settings, asked: &ObservationsAsked) -> Result<()> {
     Ok(())
 }
 
+/// # Errors
+/// There are no observations of the dataset that is asked for; those that there are.
+async fn check_dataset(store: &dyn ObservationStore, asked: &ObservationsAsked) -> Result<()> {
+    let Some(dataset) = &asked.dataset else {
+        return Ok(());
+    };
+    let of = |datasets| Filter {
+        datasets,
+        limit: MAX_LIMIT,
+        ..Filter::default()
+    };
+    if !store
+        .platforms(&of(vec![dataset.clone()]))
+        .await?
+        .is_empty()
+    {
+        return Ok(());
+    }
+    let platforms = store.platforms(&of(vec![])).await?;
+    let known: BTreeSet<String> = platforms
+        .iter()
+        .map(|own| own.dataset.to_string())
+        .collect();
+    if known.is_empty() {
+        bail!(
+            "there is no dataset {dataset}, nor any other; land files of observations with `fluxglobe ingest`"
+        );
+    }
+    let known: Vec<String> = known.into_iter().collect();
+    bail!(
+        "there is no dataset {dataset}; there are {}",
+        known.join(", ")
+    )
+}
+
 /// Of each dataset that was asked for, what files gave a value for and what is no observation.
 async fn masked(store: &storage::Store, asked: &ObservationsAsked) -> Result<Vec<String>> {
     let mut lines = vec![];
@@ -106,6 +146,9 @@ async fn masked(store: &storage::Store, asked: &ObservationsAsked) -> Result<Vec
 async fn query(settings: &Settings, asked: &ObservationsAsked) -> Result<()> {
     let store = observations::open(&asked.store, &deployment::store(settings)?)?;
     let (rows, is_all) = all(store.as_ref(), asked).await?;
+    if rows.is_empty() {
+        check_dataset(store.as_ref(), asked).await?;
+    }
     let warn = || {
         if !is_all {
             progress::say(&cut(asked.limit));
@@ -171,6 +214,9 @@ async fn matchup(settings: &Settings, options: &Matchup) -> Result<()> {
     let manifest = deployment::manifest(&store, &options.product, &settings.data).await?;
     let found = observations::open(&options.asked.store, &store)?;
     let (rows, is_all) = all(found.as_ref(), &options.asked).await?;
+    if rows.is_empty() {
+        check_dataset(found.as_ref(), &options.asked).await?;
+    }
     let time = match options.time {
         MatchTime::Nearest => TimeMatch::Nearest,
         MatchTime::Linear => TimeMatch::Linear,

@@ -4,8 +4,6 @@ use std::sync::Arc;
 
 use contract::event::RejectReason;
 use contract::product::ProductId;
-use contract::quantity::Quantity;
-use cube::Description;
 use cube::foreign::{Absent, Foreign, Found};
 use storage::attached::Attachment;
 
@@ -16,10 +14,8 @@ use crate::inspect::arrays::{self, Arrays, Indexes};
 use crate::inspect::values::Values;
 use crate::limits::Limits;
 use crate::plan::cf::packing::{StoredPacking, Unpacked};
-use crate::plan::cf::quantity::Named;
 use crate::plan::profile::Profile;
-use crate::plan::unit::Substance;
-use crate::plan::{self, Plan, Wish};
+use crate::plan::{self, Plan, Wish, written};
 
 /// What was found at an address, and what of it is read as what.
 pub(super) struct Survey {
@@ -56,12 +52,12 @@ impl Survey {
         let indexes: Indexes = request.indexes.iter().cloned().collect();
         let description = arrays::describe(&foreign, &indexes)?;
         let fill = array.fill;
-        let own = of_this_program(&foreign, variable).filter(|_| profile.is_none());
+        let own = written::description(&foreign.attributes, variable).filter(|_| profile.is_none());
         let wish = Wish {
             profile,
             product: request.product.as_ref(),
             variable: Some(variable),
-            meaning: own.as_ref().map(meaning),
+            meaning: own.as_ref().map(written::meaning),
         };
         let is_synthetic = own.is_some_and(|own| own.synthetic);
         // What is not there is fill value: no data, if the conventions say that of it.
@@ -107,22 +103,6 @@ impl Survey {
             indexes,
             place,
         })
-    }
-}
-
-/// What a cube that this program wrote says of its values.
-fn of_this_program(foreign: &Foreign, variable: &str) -> Option<Description> {
-    let own = Description::read(&foreign.attributes, "").ok()?;
-    (cube::cf::variable(own.quantity) == variable).then_some(own)
-}
-
-/// In the stored unit, positive as everything stored is.
-fn meaning(own: &Description) -> Named {
-    let is_carbon = own.quantity == Quantity::CarbonFlux;
-    Named {
-        quantity: own.quantity,
-        sign: 1.0,
-        substance: is_carbon.then_some(Substance::Carbon),
     }
 }
 

@@ -77,14 +77,25 @@ fn unreadable(e: &io::Error) -> Rejection {
     )
 }
 
+/// What lies at the top of a store of Zarr 3, of Zarr 2, of Icechunk.
+const OF_STORES: [&str; 5] = ["zarr.json", ".zgroup", ".zmetadata", ".zarray", "repo"];
+
 fn check_regular(path: &Path) -> io::Result<Result<(), Rejection>> {
-    if std::fs::metadata(path)?.is_file() {
+    let metadata = std::fs::metadata(path)?;
+    if metadata.is_file() {
         return Ok(Ok(()));
     }
+    let detail = if !metadata.is_dir() {
+        "is no regular file; give a file"
+    } else if OF_STORES.iter().any(|name| path.join(name).exists()) {
+        "is a folder of a Zarr or Icechunk store; attach it with `fluxglobe attach`"
+    } else {
+        "is a folder and no regular file; give the files in it"
+    };
     Ok(Err(Rejection::new(
         RejectReason::Unreadable,
         "file",
-        "is no regular file; give a file",
+        detail,
     )))
 }
 

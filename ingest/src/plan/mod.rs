@@ -19,6 +19,7 @@ mod stamps;
 mod steps;
 mod target;
 pub(crate) mod unit;
+pub(crate) mod written;
 
 use contract::event::RejectReason;
 use contract::product::ProductId;
@@ -32,6 +33,7 @@ use crate::inspect::file::description::{Description, Part, Variable};
 use crate::inspect::values::Values;
 use crate::limits::Limits;
 use crate::plan::cf::axis::Mapping;
+use crate::plan::cf::carbon_flux;
 use crate::plan::cf::coordinate::{self, Axis, Role};
 use crate::plan::cf::open;
 use crate::plan::cf::packing::Packing;
@@ -162,6 +164,12 @@ pub(crate) async fn plan(
             "{}: has no units; taken for a number without one, as CF says",
             variable.name
         ));
+    }
+    if profile.is_none() && matches!(meaning.quantity, Quantity::Open(_)) {
+        let untold = || Some(carbon_flux::told(variable)?.err()?.note(&variable.name));
+        if let Some(note) = written::note(description, variable).or_else(untold) {
+            planning.assume(note);
+        }
     }
     let target = target::target(&planning, variable, wish, meaning.quantity)?;
     let steps = steps::convert(variable, profile, meaning, &periods)?;

@@ -13,7 +13,8 @@ use crate::plan::profile::Profile;
 /// 3: fugacity is told from partial pressure, and temperatures of the sea surface by their depth.
 /// 4: cells lie where the bounds of axes say, and extremes and spreads over time are not taken for the quantity.
 /// 5: steps of calendars of models are counted in these, codes that values cannot hold are refused, salinity is read in the units that
-///    the conventions have for it, and notes tell of all this and of labels that are not evenly spaced.
+///    the conventions have for it, and notes tell of all this and of labels that are not evenly spaced; what this program exported is what it was, and a flux of CO2 that
+///    no standard name names is one where unit, names and `positive` say all.
 pub(crate) const DECODER: u32 = 5;
 
 /// How a file was read.

@@ -4,13 +4,13 @@ use contract::event::RejectReason;
 use contract::product::ProductId;
 use contract::quantity::Quantity;
 
-use super::{Planning, Target, Wish};
+use super::{Planning, Target, Wish, written};
 use crate::error::Rejection;
 use crate::inspect::file::description::{Description, Variable};
 use crate::plan::cf::main_variable::{self, listed};
-use crate::plan::cf::open;
 use crate::plan::cf::packing::{self, Packing};
 use crate::plan::cf::quantity::{Named, directions, has_direction, of_standard_name};
+use crate::plan::cf::{carbon_flux, open};
 use crate::plan::profile::Profile;
 use crate::plan::unit::Substance;
 
@@ -33,7 +33,7 @@ pub(super) fn choose<'a>(
 }
 
 /// Without a profile: the variable that is asked for, or else the one that the file is about, as its standard name or, if
-/// that is none of ours, its own words say.
+/// that is none of ours, this program's own export or the variable's own words say.
 fn choose_by_file<'a>(
     file: &'a Description,
     asked: Option<&str>,
@@ -43,7 +43,15 @@ fn choose_by_file<'a>(
         None => main_variable::of(file)?,
     };
     let standard_name = variable.attributes.text("standard_name");
-    let named = match standard_name.and_then(of_standard_name) {
+    let by_name = standard_name.and_then(of_standard_name);
+    if by_name.is_none()
+        && let Some(named) = written::of_file(file, variable)
+    {
+        return Ok((variable, named, assumption));
+    }
+    let is_statistic = written::note(file, variable).is_some();
+    let by_words = || carbon_flux::told(variable)?.ok().filter(|_| !is_statistic);
+    let named = match by_name.or_else(by_words) {
         Some(named) => named,
         None => Named {
             quantity: open::quantity(variable)?,

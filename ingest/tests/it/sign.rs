@@ -1,6 +1,7 @@
 //! Which way a flux is positive: the standard name and the profile agree, one of them says it, or the file is refused.
 
 use contract::event::RejectReason;
+use contract::quantity::Quantity;
 use ingest::{Outcome, Profile};
 
 use crate::fixture::{Place, refusal};
@@ -126,6 +127,45 @@ async fn a_standard_name_that_the_attribute_positive_contradicts_is_refused() {
         line.contains(DOWN) && line.contains("positive = \"up\""),
         "{line}"
     );
+}
+
+/// Without a standard name it is a flux by its unit and its name, and lands as one only if it says the rest.
+#[tokio::test]
+async fn a_flux_without_a_standard_name_is_one_if_it_says_its_sign_and_else_says_what_it_lacks() {
+    let landed = async |attributes: &[(&'static str, &'static str)]| {
+        let place = Place::new();
+        let named = [("long_name", "air-sea CO2 flux"), ("units", "mol m-2 yr-1")];
+        flux(&[&named[..], attributes].concat()).write(&place.path("a.nc"));
+        let outcome = place.land(&[place.path("a.nc")]).await.remove(0);
+        let Outcome::Landed { assumptions, .. } = outcome else {
+            panic!("{outcome}")
+        };
+        let manifest = place.newest("flux").await;
+        let value = f64::from(place.values(&manifest, 0).await[0]);
+        let about = assumptions.into_iter();
+        let about: Vec<_> = about.filter(|line| line.contains("carbon flux")).collect();
+        (manifest.quantity, value, about)
+    };
+    let carbon = 5.0 / (365.25 * 86_400.0) * 0.012_011;
+    for (positive, sign) in [("down", -1.0), ("up", 1.0)] {
+        let (quantity, value, about) = landed(&[("positive", positive)]).await;
+        assert_eq!(quantity, Quantity::CarbonFlux);
+        assert!((value / (sign * carbon) - 1.0).abs() < 1e-6, "{value:e}");
+        assert_eq!(about, Vec::<String>::new());
+    }
+    let (quantity, _, about) = landed(&[]).await;
+    assert!(
+        matches!(quantity, Quantity::Open(open) if open.words().name == "air_sea_co2_flux"),
+        "{quantity:?}"
+    );
+    let [note] = about.as_slice() else {
+        panic!("{about:?}")
+    };
+    for part in ["which way it is positive", "standard_name", "carbon_flux\""] {
+        assert!(note.contains(part), "{note}");
+    }
+    let (_, _, about) = landed(&[("units", "kg m-2 s-1"), ("positive", "up")]).await;
+    assert!(about[0].contains("of carbon or of CO2"), "{about:?}");
 }
 
 /// A mass of CO2 by its standard name stays one when the profile spells the unit anew.

@@ -122,7 +122,6 @@ pub(crate) struct GlobeQuery {
                 ("fluxglobe-heights-end" = String, description = "Accumulated carbon at which heights end, where particles are lifted by it: columns of more are drawn no higher or deeper"),
                 ("fluxglobe-tilt-with-ground" = String, description = "Largest tilt that has some of the earth's surface in the picture, where this one has none: the camera looks past it, at the sky and at what rises over the horizon"),
             )),
-        (status = 304, description = "The copy that `If-None-Match` names is still right"),
     ),
 )]
 pub(crate) async fn get(

@@ -51,7 +51,6 @@ pub(crate) struct LegendQuery {
             ("image/svg+xml"),
             ("image/png"),
         ), headers(("etag" = String, description = "Weak; names the content"))),
-        (status = 304, description = "The copy that `If-None-Match` names is still right"),
     ),
 )]
 pub(crate) async fn get(

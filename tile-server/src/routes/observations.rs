@@ -1,13 +1,17 @@
 //! `/api/observations/{dataset}/{platform}`: what a buoy, ship, station or profile measured, a page at a time.
 
+use std::collections::BTreeSet;
+
 use axum::Json;
 use axum::extract::State;
 use axum::http::header;
 use axum::response::{IntoResponse as _, Response};
 use contract::observation::{Filter, MAX_LIMIT, Page};
+use contract::product::ProductId;
 use serde::Deserialize;
 use utoipa::IntoParams;
 
+use crate::backend::Observe;
 use crate::error::ServerError;
 use crate::extract::{UrlPath, UrlQuery, time, whole_number};
 use crate::state::AppState;
@@ -51,6 +55,7 @@ pub(crate) async fn get(
     UrlQuery(asked): UrlQuery<ObservationParameters>,
 ) -> Result<Response, ServerError> {
     let observer = state.observer.get().ok_or(ServerError::NoObservations)?;
+    let dataset: ProductId = dataset.parse()?;
     let limit = match asked.limit.as_deref() {
         Some(text) => whole_number("limit", text, "1 to 10000")?,
         None => LIMIT,
@@ -65,7 +70,7 @@ pub(crate) async fn get(
     let filter = Filter {
         from: time(asked.from.as_deref())?,
         to: time(asked.to.as_deref())?,
-        datasets: vec![dataset.parse()?],
+        datasets: vec![dataset.clone()],
         platforms: vec![platform],
         properties: asked.property.into_iter().collect(),
         limit,
@@ -78,5 +83,30 @@ pub(crate) async fn get(
         .await
         .inspect_err(|_busy| state.metrics.refused.inc())?;
     let page = observer.observations(&filter).await?;
+    if page.observations.is_empty() {
+        check_dataset(observer.as_ref(), &dataset).await?;
+    }
     Ok(([(header::CACHE_CONTROL, "no-cache")], Json(page)).into_response())
+}
+
+/// # Errors
+/// There are no observations of this data set; those that there are.
+async fn check_dataset(observer: &dyn Observe, dataset: &ProductId) -> Result<(), ServerError> {
+    let of = async |datasets| {
+        let filter = Filter {
+            datasets,
+            limit: MAX_LIMIT,
+            ..Filter::default()
+        };
+        let platforms = observer.platforms(&filter).await?;
+        let named = platforms.into_iter().map(|platform| platform.dataset);
+        Ok::<BTreeSet<ProductId>, ServerError>(named.collect())
+    };
+    if of(vec![dataset.clone()]).await?.contains(dataset) {
+        return Ok(());
+    }
+    Err(ServerError::UnknownDataset {
+        name: dataset.clone(),
+        known: of(vec![]).await?.into_iter().collect(),
+    })
 }

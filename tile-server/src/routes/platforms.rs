@@ -102,6 +102,7 @@ enum Geometry {
     params(PlatformParameters),
     responses(
         (status = 200, description = "Those with observations that the question is about", body = Platforms),
+        (status = 304, description = "The copy that `If-None-Match` names is still right"),
         (status = 404, description = "This server has no observations", body = crate::error::Refusal),
     ),
 )]

@@ -86,7 +86,6 @@ pub(crate) struct TileQuery {
                 ("fluxglobe-heights-end" = String, description = "Accumulated carbon at which heights end, where particles are lifted by it: columns of more are drawn no higher or deeper"),
                 ("fluxglobe-heights-within" = String, description = "Pixels that heights end at: where to scale they would be more, all heights of the zoom level are drawn lower alike"),
             )),
-        (status = 304, description = "The copy that `If-None-Match` names is still right"),
     ),
 )]
 pub(crate) async fn get(

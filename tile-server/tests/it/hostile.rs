@@ -77,6 +77,10 @@ const BAD_ADDRESSES: &[(&str, &str)] = &[
     ("/globe/flux/map.png?lon=1e300", "longitude"),
     ("/globe/flux/map.png?width=1000000000", "1 to 7680"),
     ("/globe/flux/map.png?width=1e9", "1 to 7680"),
+    (
+        "/globe/flux/map.png?width=99999",
+        "width \"99999\" is not valid",
+    ),
     ("/globe/flux/map.png?height=0", "1 to 7680"),
     (
         "/globe/flux/map.png?height_km=-0.5",
@@ -197,7 +201,7 @@ async fn layers_and_addresses_that_do_not_exist_are_not_found() {
         ("/api", "nothing at this address"),
         ("/api/products/flux", "nothing at this address"),
         ("/tiles/flux/map/0/0", "nothing at this address"),
-        ("/no/such/page", "nothing at this address"),
+        ("/no/such/page", "at this address; /api/openapi.json"),
         ("/..%2f..%2fetc/passwd", "nothing at this address"),
         (&long, "no product"),
     ] {

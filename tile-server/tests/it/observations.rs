@@ -203,6 +203,22 @@ async fn a_server_without_observations_says_so() {
 }
 
 #[tokio::test]
+async fn a_data_set_that_is_not_there_is_told_with_those_that_are() {
+    let app = TestApp::new().await.observing();
+    *app.observer.platforms.lock().unwrap() = vec![platform("51001", PlatformKind::Buoy)];
+    let answer = app.get("/api/observations/floats/51001").await;
+    assert_eq!(answer.status, StatusCode::NOT_FOUND);
+    assert_eq!(
+        answer.reason(),
+        "there is no data set \"floats\"; there are buoys"
+    );
+    // One that measured nothing then is there.
+    let answer = app.get("/api/observations/buoys/51001?to=1990-01-01").await;
+    assert_eq!(answer.status, StatusCode::OK);
+    assert_eq!(answer.json()["observations"], json!([]));
+}
+
+#[tokio::test]
 async fn a_database_that_is_away_is_worth_another_try() {
     let app = with_buoy().await;
     app.observer

@@ -367,6 +367,22 @@ async fn what_viewers_are_told_is_as_described() {
 }
 
 #[tokio::test]
+async fn what_answers_that_a_copy_is_right_is_described_so_and_nothing_else_is() {
+    let app = rich().await;
+    let description = described().await;
+    let mut count = 0;
+    for (path, address) in ASKED {
+        let tag = app.get(address).await.header("etag").to_owned();
+        let again = app.get_with(address, &[("if-none-match", &tag)]).await;
+        let is_right = again.status == StatusCode::NOT_MODIFIED;
+        let said = &operation(&description, path)["responses"]["304"];
+        assert_eq!(is_right, said.is_object(), "{address}: {}", again.status);
+        count += usize::from(is_right);
+    }
+    assert!(count > 15, "{count}");
+}
+
+#[tokio::test]
 async fn every_refusal_is_as_described() {
     let app = rich().await;
     let description = described().await;

@@ -2,6 +2,7 @@
 
 pub(crate) mod axis;
 pub(crate) mod calendar;
+pub(crate) mod carbon_flux;
 pub(crate) mod cell_methods;
 pub(crate) mod coordinate;
 pub(crate) mod corner;

@@ -107,14 +107,12 @@ fn is_direction(name: &str, unit: &str) -> bool {
     name.split('_').any(|word| words.contains(&word)) && unit.to_ascii_lowercase().contains("deg")
 }
 
-/// `Sea Surface Temp. (day)` as `sea_surface_temp_day`; none if no letter is in it.
-fn plain_name(text: &str) -> Option<String> {
-    let letters = text.chars().map(|c| {
-        if c.is_ascii_alphanumeric() {
-            c.to_ascii_lowercase()
-        } else {
-            ' '
-        }
+/// `Sea Surface Temp. (day)` as `sea_surface_temp_day`, and the `₂` of `CO₂` as the digit it is; none if no letter is in it.
+pub(crate) fn plain_name(text: &str) -> Option<String> {
+    let letters = text.chars().map(|c| match c {
+        '\u{2080}'..='\u{2089}' => char::from(b'0' + (u32::from(c) - 0x2080) as u8),
+        _ if c.is_ascii_alphanumeric() => c.to_ascii_lowercase(),
+        _ => ' ',
     });
     let joined = letters
         .collect::<String>()
@@ -179,6 +177,8 @@ mod tests {
             three("sea_mask", "1", "River DIC flux (yearly)")
         );
         assert_eq!(words("V", &[long]).0, "river_dic_flux_yearly");
+        let lowered = ("long_name", "Air-sea CO₂ flux");
+        assert_eq!(words("V", &[lowered]).0, "air_sea_co2_flux");
         assert_eq!(
             words("_2Tm", &[("long_name", "3²")]),
             three("tm", "1", "3²")

@@ -2306,6 +2306,13 @@ export interface operations {
                     "application/json": components["schemas"]["Platforms"];
                 };
             };
+            /** @description The copy that `If-None-Match` names is still right */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
             /** @description A parameter is not valid, or missing; the reason says what would be */
             400: {
                 headers: {
@@ -2390,6 +2397,13 @@ export interface operations {
                 content: {
                     "application/json": components["schemas"]["ObservationPage"];
                 };
+            };
+            /** @description The copy that `If-None-Match` names is still right */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
             };
             /** @description A parameter is not valid, or missing; the reason says what would be */
             400: {
@@ -2690,6 +2704,13 @@ export interface operations {
                     "application/json": components["schemas"]["SeriesAnalysis"];
                 };
             };
+            /** @description The copy that `If-None-Match` names is still right */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
             /** @description A parameter is not valid, or missing; the reason says what would be */
             400: {
                 headers: {
@@ -2960,6 +2981,13 @@ export interface operations {
                     "text/csv": string;
                     "application/vnd.apache.arrow.file": unknown;
                 };
+            };
+            /** @description The copy that `If-None-Match` names is still right */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
             };
             /** @description A parameter is not valid, or missing; the reason says what would be */
             400: {
@@ -3256,6 +3284,13 @@ export interface operations {
                     "text/csv": string;
                     "application/vnd.apache.arrow.file": unknown;
                 };
+            };
+            /** @description The copy that `If-None-Match` names is still right */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
             };
             /** @description A parameter is not valid, or missing; the reason says what would be */
             400: {
@@ -3560,6 +3595,13 @@ export interface operations {
                     "application/vnd.apache.arrow.file": unknown;
                 };
             };
+            /** @description The copy that `If-None-Match` names is still right */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
             /** @description A parameter is not valid, or missing; the reason says what would be */
             400: {
                 headers: {
@@ -3847,6 +3889,13 @@ export interface operations {
                     "application/json": components["schemas"]["Correlation"];
                 };
             };
+            /** @description The copy that `If-None-Match` names is still right */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
             /** @description A parameter is not valid, or missing; the reason says what would be */
             400: {
                 headers: {
@@ -4098,6 +4147,13 @@ export interface operations {
                     "application/json": components["schemas"]["Difference"];
                 };
             };
+            /** @description The copy that `If-None-Match` names is still right */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
             /** @description A parameter is not valid, or missing; the reason says what would be */
             400: {
                 headers: {
@@ -4336,6 +4392,13 @@ export interface operations {
                 content: {
                     "application/json": components["schemas"]["Hovmoller"];
                 };
+            };
+            /** @description The copy that `If-None-Match` names is still right */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
             };
             /** @description A parameter is not valid, or missing; the reason says what would be */
             400: {
@@ -4703,6 +4766,13 @@ export interface operations {
                     "application/vnd.apache.arrow.file": unknown;
                 };
             };
+            /** @description The copy that `If-None-Match` names is still right */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
             /** @description A parameter is not valid, or missing; the reason says what would be */
             400: {
                 headers: {
@@ -4960,6 +5030,13 @@ export interface operations {
                     "text/csv": string;
                     "application/vnd.apache.arrow.file": unknown;
                 };
+            };
+            /** @description The copy that `If-None-Match` names is still right */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
             };
             /** @description A parameter is not valid, or missing; the reason says what would be */
             400: {
@@ -5615,6 +5692,13 @@ export interface operations {
                 content: {
                     "application/json": components["schemas"]["TileJson"];
                 };
+            };
+            /** @description The copy that `If-None-Match` names is still right */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
             };
             /** @description A parameter is not valid, or missing; the reason says what would be */
             400: {

@@ -1,0 +1,141 @@
+//! What a cube or an export of this program says of its own values, beyond what the conventions have names for.
+
+use contract::analysis::MapStatistic;
+use contract::quantity::Quantity;
+use cube::Description;
+use serde_json::{Map, Value};
+
+use crate::inspect::file::description::{self, Variable};
+use crate::plan::cf::quantity::{Named, directions, has_direction};
+use crate::plan::unit::Substance;
+
+/// What it is of, if it was written by this program and this variable holds values of the quantity or means of them: the highest ones
+/// of a flux are none.
+pub(crate) fn description(attributes: &Map<String, Value>, variable: &str) -> Option<Description> {
+    read(attributes, variable).filter(is_of_values)
+}
+
+/// In the stored unit, positive as everything stored is.
+pub(crate) fn meaning(own: &Description) -> Named {
+    let is_carbon = own.quantity == Quantity::CarbonFlux;
+    Named {
+        quantity: own.quantity,
+        sign: 1.0,
+        substance: is_carbon.then_some(Substance::Carbon),
+    }
+}
+
+/// What a variable of a file means that `fluxglobe export` wrote, if that is built in. What was changed in such a file since says so
+/// by `units` and `positive`, as in any other.
+pub(crate) fn of_file(file: &description::Description, variable: &Variable) -> Option<Named> {
+    let own = exported(file, variable).filter(is_of_values)?;
+    let positive = variable.attributes.text("positive").unwrap_or_default();
+    let said = directions("", positive);
+    let sign = said.first().filter(|_| has_direction(own.quantity));
+    Some(Named {
+        sign: sign.map_or(1.0, |(_, sign)| *sign),
+        ..meaning(&own)
+    })
+}
+
+/// What is told of an export whose values are not those of its quantity.
+pub(crate) fn note(file: &description::Description, variable: &Variable) -> Option<String> {
+    let own = exported(file, variable).filter(|own| !is_of_values(own))?;
+    let statistic = own.statistic?;
+    Some(format!(
+        "{}: holds the statistic {statistic} over time of {} and not that itself; it has no budget",
+        variable.name,
+        own.quantity.title()
+    ))
+}
+
+fn read(attributes: &Map<String, Value>, variable: &str) -> Option<Description> {
+    let own = Description::read(attributes, "").ok()?;
+    (cube::cf::variable(own.quantity) == variable).then_some(own)
+}
+
+fn is_of_values(own: &Description) -> bool {
+    matches!(own.statistic, None | Some(MapStatistic::Mean))
+}
+
+/// What an exported file says of a quantity that is built in.
+fn exported(file: &description::Description, variable: &Variable) -> Option<Description> {
+    let text = file.attributes.text(Description::ATTRIBUTE)?;
+    let said: Value = serde_json::from_str(text).ok()?;
+    let attributes = Map::from_iter([(Description::ATTRIBUTE.to_owned(), said)]);
+    let own = read(&attributes, &variable.name)?;
+    (!matches!(own.quantity, Quantity::Open(_))).then_some(own)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::inspect::file::description::{AttributeValue, Kind};
+    use contract::grid::Grid;
+
+    /// A file that an export of a flux could be, and its variable.
+    fn file(
+        statistic: Option<MapStatistic>,
+        positive: &str,
+    ) -> (description::Description, Variable) {
+        let own = Description {
+            product: "p".parse().unwrap(),
+            title: "P".to_owned(),
+            quantity: Quantity::CarbonFlux,
+            synthetic: false,
+            source: "S".to_owned(),
+            grid: Grid {
+                rows: 2,
+                cols: 3,
+                north_deg: 1.0,
+                west_deg: 0.0,
+                dlat_deg: 1.0,
+                dlon_deg: 1.0,
+            },
+            version: None,
+            statistic,
+        };
+        let text = |name: &str, text: String| (name.to_owned(), AttributeValue::Text(text));
+        let said = own.attributes()[Description::ATTRIBUTE].to_string();
+        let variable = Variable {
+            name: "carbon_flux".to_owned(),
+            dimensions: vec![],
+            kind: Kind::Float(4),
+            attributes: [text("positive", positive.to_owned())]
+                .into_iter()
+                .collect(),
+        };
+        let file = description::Description {
+            attributes: [text(Description::ATTRIBUTE, said)].into_iter().collect(),
+            variables: vec![variable.clone()],
+            ..description::Description::default()
+        };
+        (file, variable)
+    }
+
+    #[test]
+    fn an_export_is_what_it_was_and_an_extreme_of_it_is_not() {
+        for statistic in [None, Some(MapStatistic::Mean)] {
+            for (positive, sign) in [("up", 1.0), ("", 1.0), ("down", -1.0)] {
+                let (file, variable) = file(statistic, positive);
+                let named = of_file(&file, &variable).unwrap();
+                let found = (named.quantity, named.substance);
+                assert_eq!(found, (Quantity::CarbonFlux, Some(Substance::Carbon)));
+                assert!((named.sign - sign).abs() < f64::EPSILON, "{positive}");
+                assert_eq!(note(&file, &variable), None);
+            }
+        }
+        let (file, mut variable) = file(Some(MapStatistic::Max), "up");
+        assert_eq!(of_file(&file, &variable), None);
+        // Nor is the cube of it that is attached.
+        let text = file.attributes.text(Description::ATTRIBUTE).unwrap();
+        let said: Value = serde_json::from_str(text).unwrap();
+        let attributes = Map::from_iter([(Description::ATTRIBUTE.to_owned(), said)]);
+        assert!(read(&attributes, "carbon_flux").is_some());
+        assert!(description(&attributes, "carbon_flux").is_none());
+        let told = note(&file, &variable).unwrap();
+        assert!(told.contains("statistic max"), "{told}");
+        variable.name = "another".to_owned();
+        assert_eq!(note(&file, &variable), None);
+    }
+}
