@@ -3,13 +3,11 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use super::{Profile, shipped};
+use super::{Profile, listed, shipped};
 use crate::error::IngestError;
 
 /// Most profiles of a folder.
 const MAX_PROFILES: usize = 1000;
-/// Names of profiles that a message lists: a refusal of a file is cut at 300 characters.
-const LISTED_BYTES: usize = 200;
 
 /// All profiles, in the order in which they are tried.
 #[derive(Debug, Clone)]
@@ -64,24 +62,8 @@ impl Profiles {
         let found = self.iter().find(|profile| profile.name == name);
         found.cloned().ok_or_else(|| IngestError::Profile {
             name: name.to_owned(),
-            detail: format!("is none of {}", self.listed()),
+            detail: format!("is none of {}", listed(&self.0)),
         })
-    }
-
-    /// Their names, as many whole ones as fit in a line.
-    fn listed(&self) -> String {
-        let (mut text, mut left) = (String::new(), self.0.len());
-        for profile in self.iter() {
-            if text.len() + profile.name.len() > LISTED_BYTES {
-                return format!("{text} and {left} more");
-            }
-            if !text.is_empty() {
-                text.push_str(", ");
-            }
-            text.push_str(&profile.name);
-            left -= 1;
-        }
-        text
     }
 
     /// The profile for files of a collection, as notices of other systems name it.

@@ -25,6 +25,8 @@ pub use shipped::shipped;
 
 /// Largest profile, bytes.
 const MAX_PROFILE_BYTES: u64 = 1 << 20;
+/// Names of profiles that a message lists: a refusal of a file is cut at 300 characters.
+const LISTED_BYTES: usize = 200;
 
 /// How a family of files maps to a product.
 #[derive(Debug, Clone, Deserialize)]
@@ -237,14 +239,9 @@ impl Profile {
         if Path::new(name_or_path).is_file() {
             return Self::load(Path::new(name_or_path));
         }
-        let names = shipped()
-            .iter()
-            .map(|p| p.name.as_str())
-            .collect::<Vec<_>>()
-            .join(", ");
         Err(IngestError::Profile {
             name: name_or_path.to_owned(),
-            detail: format!("is no file and none of {names}"),
+            detail: format!("is no file and none of {}", listed(shipped())),
         })
     }
 
@@ -299,4 +296,20 @@ impl Profile {
                 .all(|name| file.variable(name).is_none())
             && rules.attributes.iter().all(attribute_is)
     }
+}
+
+/// Names of profiles, as many whole ones as fit in a line.
+fn listed(profiles: &[Profile]) -> String {
+    let (mut text, mut left) = (String::new(), profiles.len());
+    for profile in profiles {
+        if text.len() + profile.name.len() > LISTED_BYTES {
+            return format!("{text} and {left} more");
+        }
+        if !text.is_empty() {
+            text.push_str(", ");
+        }
+        text.push_str(&profile.name);
+        left -= 1;
+    }
+    text
 }

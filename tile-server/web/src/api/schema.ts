@@ -1262,7 +1262,8 @@ export interface components {
         };
         /**
          * @description The test of Mann and Kendall, its variance corrected for autocorrelation (Hamed and Rao 1998,
-         *     doi:10.1016/S0022-1694(97)00125-X): over all lags at which the ranks of the detrended values are correlated beyond 95 % of chance.
+         *     doi:10.1016/S0022-1694(97)00125-X), with that of the ranks of the detrended values from one step to the next, where it is beyond 95 % of chance, and its
+         *     powers at longer lags (Yue and Wang 2004, doi:10.1023/B:WARM.0000043140.61082.60).
          */
         MannKendall: {
             /**
@@ -2051,7 +2052,7 @@ export interface components {
          */
         TimeStep: "native" | "day" | "week" | "month" | "season" | "year" | "total";
         /**
-         * @description Trends of a series. Where steps are shorter than a year, the mean of each calendar month is taken off first, so that a
+         * @description Trends of a series. Where steps are no longer than months, or as long as seasons, the mean of each calendar month, or season, is taken off first, so that a
          *     season that begins or ends early is no trend.
          */
         Trend: {
@@ -2060,7 +2061,7 @@ export interface components {
              * @description Number of values.
              */
             count: number;
-            /** @description Was the mean of each calendar month taken off first? */
+            /** @description Was the mean of each calendar month, or season, taken off first? */
             deseasonalised: boolean;
             /** @description By least squares. */
             least_squares: components["schemas"]["LeastSquaresTrend"];
@@ -2075,7 +2076,7 @@ export interface components {
             mid: components["schemas"]["TimeMs"];
             /** @description Unit of every slope. */
             slope_unit: string;
-            /** @description Means that it is drawn through; of months and years those that hold data over half of their time. */
+            /** @description Means that it is drawn through; of months those that hold data over half of their time, of seasons and years over 95 % of it. */
             step: components["schemas"]["TimeStep"];
             /** @description By the median of the slopes of all pairs. */
             theil_sen: components["schemas"]["TheilSenTrend"];
