@@ -2,6 +2,7 @@
 
 use anyhow::{Result, anyhow};
 use contract::cited::Cited;
+use contract::time::TimeStep;
 use plotters::coord::Shift;
 use plotters::prelude::{
     Color as _, DrawingArea, IntoDrawingArea as _, IntoFont as _, RGBColor, SVGBackend, Text,
@@ -132,6 +133,14 @@ fn style(size: i32, colour: &RGBColor) -> TextStyle<'static> {
     TextStyle {
         color: colour.to_backend_color(),
         ..TextStyle::from(("sans-serif", size).into_font())
+    }
+}
+
+/// What one row is of.
+pub(super) fn of_a_row(step: TimeStep) -> &'static str {
+    match step {
+        TimeStep::Native => "step",
+        other => other.as_str(),
     }
 }
 

@@ -38,7 +38,7 @@ pub(super) fn of_statistics(answer: &StatisticsAnswer) -> Result<String> {
         "{} of {}, a row a {}{}{}",
         names.join(", "),
         answer.kind,
-        answer.step,
+        page::of_a_row(answer.step),
         if has_band {
             "; band: mean and one standard deviation on either side"
         } else {
