@@ -139,7 +139,7 @@ for name, series in ("series", SERIES), ("slow", SLOW):
     # What values keep from step to step, and its powers, in the place of what is found at each lag.
     found = pymannkendall.hamed_rao_modification_test(series)
     print("hamed-rao", name, found.s, found.var_s, found.z, found.p, found.slope)
-    print("corrected", name, *corrected(series, found.slope))
+    print("corrected", name, *corrected(series, round(found.slope, 12)))
 waves()
 for lag in (-3, 0, 1, 2):
     print("lag", lag, *lagged(SERIES, OTHER, lag))

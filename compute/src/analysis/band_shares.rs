@@ -249,7 +249,7 @@ mod tests {
         for (region, rows) in [
             // A hair across the equator and across 45 E.
             (
-                "POLYGON((0 -1e-6,45.000001 -1e-6,45.000001 40,0 40,0 -1e-6))",
+                "POLYGON((0 -2e-7,45.0000002 -2e-7,45.0000002 40,0 40,0 -2e-7))",
                 1..2,
             ),
             // A square of some 200 m, in two rows.

@@ -6,17 +6,22 @@ use super::line::Line;
 
 /// Milliseconds in a Julian year of 365.25 days.
 pub const YEAR_MS: f64 = 365.25 * 86_400_000.0;
-/// Share of a month's time, or of a shorter bin's, that must hold data for its mean to count.
+/// Share of a bin's time that must hold data for its mean to count; of seasons and years of that of each of their months, for what they lack else is a part
+/// of the year, and their mean has the rest of the season in it.
 const LEAST_SHARE: f64 = 0.5;
-/// The same of seasons and years: what is missing of these is a part of the year, and their mean would have the rest of the season in it.
-const LEAST_SHARE_OF_LONG: f64 = 0.95;
 
-/// Share of the time of a bin of the calendar that must hold data for its mean to count.
-pub fn least_share(step: TimeStep) -> f64 {
-    match step {
-        TimeStep::Native | TimeStep::Day | TimeStep::Week | TimeStep::Month => LEAST_SHARE,
-        TimeStep::Season | TimeStep::Year | TimeStep::Total => LEAST_SHARE_OF_LONG,
+/// What must hold data for a mean over a bin of the calendar, in words.
+pub fn least_in_words(step: TimeStep) -> &'static str {
+    if has_months(step) {
+        "half of each of its months"
+    } else {
+        "half of its time"
     }
+}
+
+/// Are bins of this step made of months?
+fn has_months(step: TimeStep) -> bool {
+    matches!(step, TimeStep::Season | TimeStep::Year | TimeStep::Total)
 }
 
 /// Middles of periods, years of 365.25 days after the first one's.
@@ -41,16 +46,61 @@ pub fn means_over(periods: &[Period], values: &[f64], step: TimeStep) -> (Vec<Pe
 pub struct Bins {
     periods: Vec<Period>,
     steps: Steps,
-    /// That of [`least_share`].
-    least_share: f64,
 }
 
 #[derive(Debug)]
 enum Steps {
     /// Steps are taken as they are.
     Native(Line),
-    /// Of each bin the first step that reaches into it, and how many seconds of that and of each one after it lie in it.
-    Inside(Vec<(usize, Vec<f64>)>),
+    /// Those that lie in each bin.
+    Inside(Vec<InBin>),
+}
+
+/// Steps that lie in a bin.
+#[derive(Debug)]
+pub struct InBin {
+    /// How they lie in it.
+    pub whole: Inside,
+    /// How they lie in each of its months; nothing of bins that are no longer.
+    pub months: Vec<Inside>,
+}
+
+/// Steps that lie in a period of the calendar.
+#[derive(Debug)]
+pub struct Inside {
+    /// The first step that reaches into it.
+    pub from: usize,
+    /// How many seconds of that and of each one after it lie in it.
+    pub shared_s: Vec<f64>,
+    /// Seconds that must hold data.
+    pub least_s: f64,
+}
+
+impl Inside {
+    /// Of steps in the order of time, those before `from` beside it.
+    fn of(periods: &[Period], bin: Period, mut from: usize) -> Self {
+        while from < periods.len() && periods[from].end <= bin.start {
+            from += 1;
+        }
+        let own = periods[from..].iter();
+        let own = own.take_while(|period| period.start < bin.end);
+        let shared_s = own.map(|period| {
+            let shared_ms = period.end.min(bin.end).ms() - period.start.max(bin.start).ms();
+            shared_ms as f64 / 1000.0
+        });
+        Self {
+            from,
+            shared_s: shared_s.collect(),
+            least_s: LEAST_SHARE * bin.seconds(),
+        }
+    }
+
+    /// Do steps hold data over enough of it?
+    fn is_held(&self, values: &[f64]) -> bool {
+        let shared = values[self.from..].iter().zip(&self.shared_s);
+        let with_data_s = shared.map(|(value, s)| if value.is_nan() { 0.0 } else { *s });
+        with_data_s.sum::<f64>() >= self.least_s
+    }
 }
 
 impl Bins {
@@ -64,29 +114,22 @@ impl Bins {
             return Self {
                 periods: line.steps.clone(),
                 steps: Steps::Native(line),
-                least_share: least_share(step),
             };
         }
         let bins = bins_over(periods, step);
-        let mut inside = Vec::with_capacity(bins.len());
-        let mut from = 0;
+        let mut inside: Vec<InBin> = Vec::with_capacity(bins.len());
         for bin in &bins {
-            while from < periods.len() && periods[from].end <= bin.start {
-                from += 1;
-            }
-            let own = periods[from..].iter();
-            let own = own.take_while(|period| period.start < bin.end);
-            let shared_s = own.map(|period| {
-                let shared_ms = period.end.min(bin.end).ms() - period.start.max(bin.start).ms();
-                shared_ms as f64 / 1000.0
+            let from = inside.last().map_or(0, |before| before.whole.from);
+            let months = has_months(step).then(|| TimeStep::Month.whole_bins(*bin));
+            let in_month = |month: &Period| Inside::of(periods, *month, from);
+            inside.push(InBin {
+                whole: Inside::of(periods, *bin, from),
+                months: months.iter().flatten().map(in_month).collect(),
             });
-            inside.push((from, shared_s.collect()));
         }
-        let steps = Steps::Inside(inside);
         Self {
             periods: bins,
-            steps,
-            least_share: least_share(step),
+            steps: Steps::Inside(inside),
         }
     }
 
@@ -95,36 +138,38 @@ impl Bins {
         &self.periods
     }
 
-    /// Of each bin the first step that reaches into it, and how many seconds of that and of each one after it lie in it; nothing
-    /// of steps that are taken as they are.
-    pub fn shares(&self) -> impl Iterator<Item = (Period, usize, &[f64])> {
-        let inside: &[(usize, Vec<f64>)] = match &self.steps {
+    /// Each bin with the steps that lie in it; nothing of steps that are taken as they are.
+    pub fn inside(&self) -> impl Iterator<Item = (Period, &InBin)> {
+        let inside: &[InBin] = match &self.steps {
             Steps::Native(_) => &[],
             Steps::Inside(inside) => inside,
         };
-        let bins = self.periods.iter().zip(inside);
-        bins.map(|(bin, (from, shared_s))| (*bin, *from, &shared_s[..]))
+        self.periods.iter().copied().zip(inside)
     }
 
-    /// Means over the bins, NaN where less of a bin's time holds data than [`least_share`]: each step counts by the time of it that lies
-    /// in the bin. `values` are one for each step, NaN no data, any unit.
+    /// Means over the bins, NaN where half of a bin's time, or of one of its months, holds no data: each step counts by the time of it that
+    /// lies in the bin. `values` are one for each step, NaN no data, any unit.
     pub fn means(&self, values: &[f64]) -> Vec<f64> {
         let inside = match &self.steps {
             Steps::Native(line) => return line.spread(values),
             Steps::Inside(inside) => inside,
         };
-        let mean = |(bin, (from, shared_s)): (&Period, &(usize, Vec<f64>))| {
+        let mean = |InBin { whole, months }: &InBin| {
             let (mut sum, mut with_data_s) = (0.0, 0.0);
-            for (value, shared_s) in values[*from..].iter().zip(shared_s) {
+            for (value, shared_s) in values[whole.from..].iter().zip(&whole.shared_s) {
                 if !value.is_nan() {
                     sum += value * shared_s;
                     with_data_s += shared_s;
                 }
             }
-            let is_held = with_data_s >= self.least_share * bin.seconds();
-            if is_held { sum / with_data_s } else { f64::NAN }
+            let is_held = with_data_s >= whole.least_s;
+            if is_held && months.iter().all(|month| month.is_held(values)) {
+                sum / with_data_s
+            } else {
+                f64::NAN
+            }
         };
-        self.periods.iter().zip(inside).map(mean).collect()
+        inside.iter().map(mean).collect()
     }
 }
 
@@ -132,8 +177,8 @@ impl Bins {
 pub fn left_out(periods: &[Period], values: &[f64], step: TimeStep) -> Option<String> {
     let bins = Bins::over(periods, step);
     let means = bins.means(values);
-    let held = bins.shares().zip(&means).filter(|((_, from, shares), _)| {
-        let own = &values[*from..][..shares.len()];
+    let held = bins.inside().zip(&means).filter(|((_, inside), _)| {
+        let own = &values[inside.whole.from..][..inside.whole.shared_s.len()];
         own.iter().any(|value| !value.is_nan())
     });
     let (mut all, mut left_out) = (0, 0);
@@ -143,8 +188,8 @@ pub fn left_out(periods: &[Period], values: &[f64], step: TimeStep) -> Option<St
     }
     (left_out > 0).then(|| {
         format!(
-            "{left_out} of {all} means of step {step} hold data over less than {:.0} % of their time and are left out",
-            100.0 * least_share(step)
+            "{left_out} of {all} means of step {step} are left out: a mean needs data over {}",
+            least_in_words(step)
         )
     })
 }
@@ -202,7 +247,7 @@ mod tests {
         assert!((means[4] - 3.0).abs() < 1e-12);
         let (years, means) = means_over(&periods, &values, TimeStep::Year);
         assert_eq!((years.len(), means[0].is_nan()), (1, true));
-        // Of eleven months a year has no mean: what is missing is a part of its season. Of all days but ten it has.
+        // Of eleven months a year has no mean: what is missing is a part of its season. Of two days of three it has.
         let year: Vec<Period> = (1..=12)
             .map(|month| Period::month(2001, month).unwrap())
             .collect();
@@ -217,7 +262,7 @@ mod tests {
         assert_eq!(is_held, [false, true, false, true, false]);
         let days: Vec<Period> = TimeStep::Day.whole_bins(Period::year(2001).unwrap());
         let most: Vec<f64> = (0..365)
-            .map(|d| if d % 36 == 5 { f64::NAN } else { 1.0 })
+            .map(|d| if d % 3 == 1 { f64::NAN } else { 1.0 })
             .collect();
         assert!((means_over(&days, &most, TimeStep::Year).1[0] - 1.0).abs() < 1e-12);
         let (as_they_are, _) = means_over(&periods, &values, TimeStep::Native);

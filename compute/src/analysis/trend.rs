@@ -19,8 +19,8 @@ use super::undefined::Undefined;
 const WHAT: &str = "a trend";
 /// Years of values that a trend needs: of fewer, each month's own mean takes more than a fifth of the noise that it is taken off from.
 pub const LEAST_YEARS: f64 = 5.0;
-/// Rounding of the years between two middles: of five years of months 4 years and 11 months lie between them.
-const MONTH_YEARS: f64 = 0.09;
+/// Beside the length of a bin, of which one may lack at either end: rounding, years.
+const ROUNDING_YEARS: f64 = 0.006;
 /// Shortest three months, s: of two steps that are shorter both may lie in one season.
 const LEAST_SEASON_S: f64 = 88.0 * 86_400.0;
 /// Years in a decade.
@@ -264,7 +264,8 @@ fn years_of(periods: &[Period], values: &[f64], here: &[usize]) -> Result<f64, U
     }
     let (first, last) = (periods[here[0]], periods[here[found - 1]]);
     let found_years = (last.end.ms() - first.start.ms()) as f64 / YEAR_MS;
-    if found_years < LEAST_YEARS - MONTH_YEARS {
+    let bin_years = longest_s(periods) * 1e3 / YEAR_MS;
+    if found_years < LEAST_YEARS - bin_years - ROUNDING_YEARS {
         let needed_years = LEAST_YEARS;
         return Err(Undefined::TooShort {
             what,

@@ -72,28 +72,26 @@ async fn statistics_of_accumulated_carbon_are_no_accumulated_carbon() {
     let place = ONE_DEGREE.cell_center(80, 40);
     let counted = point_series(&engine, &sums.product, place).await.unwrap();
     assert!(counted.series.iter().all(|row| row.contributed.is_some()));
-    for (statistic, crop) in [
-        (MapStatistic::Max, false),
-        (MapStatistic::Climatology, true),
+    for (name, statistic, crop) in [
+        ("most", MapStatistic::Max, false),
+        ("normal", MapStatistic::Climatology, true),
     ] {
         let options = MapOptions {
             region: Some("-150,0,-120,30".parse().unwrap()),
             crop,
-            name: Some(product("some")),
+            name: Some(product(name)),
             ..MapOptions::new(statistic)
         };
         let made = derive_statistic(&engine, &sums.product, &options, &|_| ()).await;
         assert_eq!(made.unwrap().quantity, Quantity::AccumulatedCarbon);
-        let found = point_series(&engine, &product("some"), place)
-            .await
-            .unwrap();
+        let found = point_series(&engine, &product(name), place).await.unwrap();
         assert!(
             found
                 .series
                 .iter()
                 .all(|row| row.contributed.is_none() && row.value.is_some())
         );
-        let query = total(&product("some"), "global");
+        let query = total(&product(name), "global");
         let refused = budget(&engine, &query).await.unwrap_err().to_string();
         assert!(refused.contains("only a carbon flux"), "{refused}");
     }

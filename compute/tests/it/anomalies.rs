@@ -90,12 +90,23 @@ fn reckoned(
     is_in_base: impl Fn(Period) -> bool,
 ) -> BTreeMap<TimeMs, f64> {
     let mut members: BTreeMap<Period, Vec<f64>> = BTreeMap::new();
+    let mut held_days: BTreeMap<Period, i64> = BTreeMap::new();
     for number in days {
         let own = members.entry(bin(day(*number))).or_default();
-        own.extend(Some(f64::from(value(*number, cell))).filter(|it| !it.is_nan()));
+        let value = Some(f64::from(value(*number, cell))).filter(|it| !it.is_nan());
+        own.extend(value);
+        let month = TimeStep::Month
+            .calendar(day(*number).start)
+            .unwrap()
+            .unwrap();
+        *held_days.entry(month).or_default() += i64::from(value.is_some());
     }
     let days_of = |bin: &Period| (bin.end.ms() - bin.start.ms()) / DAY_MS;
-    members.retain(|bin, own| 2 * own.len() as i64 >= days_of(bin));
+    let is_held = |month: &Period| 2 * held_days.get(month).unwrap_or(&0) >= days_of(month);
+    members.retain(|bin, own| {
+        let months = TimeStep::Month.whole_bins(*bin);
+        2 * own.len() as i64 >= days_of(bin) && (days_of(bin) <= 31 || months.iter().all(is_held))
+    });
     let means = members
         .iter()
         .map(|(bin, own)| (*bin, own.iter().sum::<f64>() / own.len() as f64));
@@ -285,7 +296,7 @@ async fn means_that_nothing_is_an_anomaly_of_are_refused_with_the_reason() {
                 to: "2000-11-25".parse().ok(),
                 ..of(TimeStep::Month, "none")
             },
-            "half of none",
+            "has steps over half of its time",
         ),
     ] {
         let refused = derived(&engine, &options).await.unwrap_err().to_string();

@@ -92,7 +92,7 @@ async fn what_may_surprise_stands_in_every_row() {
     let sql = sql_of(&Engine::in_process(store, parts(2)));
     for (word, rows) in [("climatology", 12), ("anomaly", 24)] {
         let of = |place: &str| format!("SELECT notes FROM analysis('sst', '{place}', '{word}')");
-        let told = texts(&sql, &of("global")).await;
+        let told = texts(&sql, &of("161,-64,-130,64")).await;
         let little = "3 of 24 steps hold data over less than half of the region's sea";
         assert_eq!(told.len(), rows);
         assert!(told.iter().all(|row| row[0].contains(little)), "{told:?}");

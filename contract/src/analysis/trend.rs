@@ -14,7 +14,7 @@ const LONGEST_MONTH_MS: i64 = 32 * 86_400_000;
 pub struct Trend {
     /// Unit of every slope.
     pub slope_unit: String,
-    /// Means that it is drawn through; of months those that hold data over half of their time, of seasons and years over 95 % of it.
+    /// Means that it is drawn through; of months those that hold data over half of their time, of seasons and years over half of each of their months.
     pub step: TimeStep,
     /// Was the mean of each calendar month, or season, taken off first?
     pub deseasonalised: bool,

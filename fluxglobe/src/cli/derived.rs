@@ -20,8 +20,8 @@ How two products go together in each cell, over the months that both have:
 
 makes sst-correlation-wind and so on, each cell what `fluxglobe stats correlate --at` says of it:
 Pearson's r, -1 to 1; p by effective pairs, which allow for autocorrelation (Bretherton et al.
-1999); pairs of months, each of which holds data in half of its time (of seasons and years in 95 %
-of it). Seasons alone make most pairs of products go together: --deseasonalise takes them off
+1999); pairs of months, each of which holds data in half of its time (of seasons and years in half
+of each of their months). Seasons alone make most pairs of products go together: --deseasonalise takes them off
 first. With --lag 2 the second is read two months after the first, with --lag=-2 before it; give
 maps of several lags a --name each.
 Both lie on one grid: `fluxglobe derive regrid` brings one to that of the other.

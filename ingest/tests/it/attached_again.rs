@@ -408,27 +408,6 @@ async fn what_cannot_be_true_is_masked_when_it_is_attached_and_whenever_it_is_re
 }
 
 #[tokio::test]
-async fn coordinates_that_were_not_written_are_their_fill_value() {
-    let own = Own::with("v3-gzip.zarr");
-    own.edit("time/zarr.json", |it| {
-        it["chunk_grid"]["configuration"]["chunk_shape"] = json!([1]);
-    });
-    // The first is 0, as what is not there.
-    let path = own.path().join("time/c");
-    std::fs::remove_file(path.join("0")).unwrap();
-    for day in [1_i32, 2] {
-        std::fs::write(path.join(day.to_string()), day.to_le_bytes()).unwrap();
-    }
-    own.attach().await.unwrap();
-    let newest = own.newest().await;
-    assert_eq!(newest.steps.len(), 3);
-    assert_eq!(
-        newest.steps[0].period.start.to_string(),
-        "2020-01-01T00:00:00Z"
-    );
-}
-
-#[tokio::test]
 async fn a_valid_range_in_json_is_of_stored_numbers_unless_it_has_a_fraction() {
     for (highest, most_kelvin) in [(json!(1000), 288.15), (json!(15.5), 288.65)] {
         let own = Own::with("v2-blosc.zarr");

@@ -193,7 +193,7 @@ async fn a_file_without_time_is_refused() {
         &place,
         "twice.nc",
         RejectReason::Time,
-        &["overlap", "1 and 2 of the file"],
+        &["2001-01-04 twice", "the steps 1 and 2 of the file"],
     )
     .await;
 }

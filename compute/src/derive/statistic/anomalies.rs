@@ -23,7 +23,7 @@ const ON_THEIR_WAY: usize = 4;
 /// Share of the memory for work that they may take.
 const FIELDS_SHARE: usize = 8;
 /// Bytes of a cell on its way: its value, in its pages, as they are stored, and the sum that it may be made of.
-const CELL_BYTES: usize = 28;
+const CELL_BYTES: usize = 44;
 
 /// A version to be published, and what its cube can be made of.
 pub(super) type Made = (Manifest, Option<Arc<dyn AtHand>>);

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use contract::time::{Period, TimeStep};
 
-use crate::analysis::timeline::{Bins, least_share};
+use crate::analysis::timeline::{Bins, InBin};
 
 /// A mean of steps that follow each other, each by the time of it that lies in the mean's; of a step that is taken as it is its value.
 #[derive(Debug, Clone, PartialEq)]
@@ -16,6 +16,10 @@ pub(super) struct MeanOf {
     shared_s: Vec<f64>,
     /// Seconds that must hold data.
     least_s: f64,
+    /// The same of each of its months; nothing of means that are no longer.
+    month_least_s: Vec<f64>,
+    /// Of each step its months, by their place, and the seconds that lie in them.
+    in_months: Vec<Vec<(u16, f64)>>,
 }
 
 /// What a mean has come to, its steps added in the order of time.
@@ -24,6 +28,11 @@ pub(super) struct Sum {
     /// Values times seconds.
     values_s: f64,
     with_data_s: f64,
+    /// The month that was added to last, counted from 1, and how much of it holds data.
+    month: u16,
+    month_s: f64,
+    /// Months before it that hold enough.
+    held_months: u16,
 }
 
 impl Default for Sum {
@@ -32,7 +41,19 @@ impl Default for Sum {
             // Whatever is added to it stays what it is, -0.0 too.
             values_s: -0.0,
             with_data_s: 0.0,
+            month: 0,
+            month_s: 0.0,
+            held_months: 0,
         }
+    }
+}
+
+impl Sum {
+    /// Months that hold enough, that which was added to last among them.
+    fn held(&self, least_s: &[f64]) -> u16 {
+        let last = usize::from(self.month).checked_sub(1);
+        let is_held = last.is_some_and(|last| self.month_s >= least_s[last]);
+        self.held_months + u16::from(is_held)
     }
 }
 
@@ -45,13 +66,23 @@ impl MeanOf {
             // Whatever is multiplied and divided with it stays what it is.
             shared_s: vec![1.0],
             least_s: 1.0,
+            month_least_s: vec![],
+            in_months: vec![],
         }
     }
 
     /// Adds the value of one of its steps, NaN no data.
     pub(super) fn add(&self, sum: &mut Sum, step: usize, value: f32) {
+        let step = step - self.steps.start;
+        for (month, shared_s) in self.in_months.get(step).into_iter().flatten() {
+            if sum.month != month + 1 {
+                sum.held_months = sum.held(&self.month_least_s);
+                (sum.month, sum.month_s) = (month + 1, 0.0);
+            }
+            sum.month_s += if value.is_nan() { 0.0 } else { *shared_s };
+        }
         if !value.is_nan() {
-            let shared_s = self.shared_s[step - self.steps.start];
+            let shared_s = self.shared_s[step];
             sum.values_s += f64::from(value) * shared_s;
             sum.with_data_s += shared_s;
         }
@@ -59,7 +90,8 @@ impl MeanOf {
 
     /// The mean when all of its steps were added, NaN where too little of its time holds data.
     pub(super) fn mean(&self, sum: Sum) -> f64 {
-        if sum.with_data_s >= self.least_s {
+        let held_months = usize::from(sum.held(&self.month_least_s));
+        if sum.with_data_s >= self.least_s && held_months == self.month_least_s.len() {
             sum.values_s / sum.with_data_s
         } else {
             f64::NAN
@@ -80,17 +112,28 @@ impl MeanOf {
 /// that must hold data. Bins that steps cover less of are left out: no cell has a mean there.
 pub(super) fn over(periods: &[Period], step: TimeStep) -> Vec<MeanOf> {
     let bins = Bins::over(periods, step);
-    let mean = |(period, from, shared_s): (Period, usize, &[f64])| {
-        let least_s = least_share(step) * period.seconds();
-        let covered_s: f64 = shared_s.iter().sum();
-        (covered_s >= least_s).then(|| MeanOf {
+    let mean = |(period, InBin { whole, months }): (Period, &InBin)| {
+        let covered = |shared_s: &[f64], least_s: f64| shared_s.iter().sum::<f64>() >= least_s;
+        let mut in_months = vec![vec![]; whole.shared_s.len()];
+        for (number, month) in (0..).zip(months) {
+            for (step, shared_s) in (month.from..).zip(&month.shared_s) {
+                in_months[step - whole.from].push((number, *shared_s));
+            }
+        }
+        let are_covered = covered(&whole.shared_s, whole.least_s)
+            && months
+                .iter()
+                .all(|month| covered(&month.shared_s, month.least_s));
+        are_covered.then(|| MeanOf {
             period,
-            steps: from..from + shared_s.len(),
-            shared_s: shared_s.to_vec(),
-            least_s,
+            steps: whole.from..whole.from + whole.shared_s.len(),
+            shared_s: whole.shared_s.clone(),
+            least_s: whole.least_s,
+            month_least_s: months.iter().map(|month| month.least_s).collect(),
+            in_months: if months.is_empty() { vec![] } else { in_months },
         })
     };
-    bins.shares().filter_map(mean).collect()
+    bins.inside().filter_map(mean).collect()
 }
 
 #[cfg(test)]
@@ -110,9 +153,11 @@ mod tests {
             (1, TimeStep::Week),
             (1, TimeStep::Month),
             (8, TimeStep::Month),
-            (8, TimeStep::Year),
+            (8, TimeStep::Season),
+            (1, TimeStep::Season),
+            (1, TimeStep::Year),
         ] {
-            let periods = days(200, of_days);
+            let periods = days(1200 / of_days, of_days);
             let value = |at: usize| {
                 let gap = at % 7 == 3 || (40..90).contains(&at);
                 if gap { f32::NAN } else { at as f32 * 0.37 }

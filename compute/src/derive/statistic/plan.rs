@@ -33,7 +33,7 @@ fn method(statistic: MapStatistic) -> u32 {
         | MapStatistic::TrendPValue
         | MapStatistic::LeastSquaresTrend
         | MapStatistic::LeastSquaresTrendPValue => 3,
-        // Seasons and years have means where nearly all of their time holds data, waves where data lie all the year round, and steps that never
+        // Seasons and years have means where all of their months hold data, waves where data lie all the year round, and steps that never
         // landed are time without data, since 2.
         _ => 2,
     }

@@ -9,7 +9,7 @@ use contract::manifest::{Manifest, Step};
 use contract::time::{Period, TimeStep};
 
 use super::means::{self, MeanOf};
-use crate::analysis::timeline::{least_share, longest_s};
+use crate::analysis::timeline::{least_in_words, longest_s};
 
 /// Steps by their place.
 pub(super) struct Ranges {
@@ -63,10 +63,10 @@ impl Ranges {
         let covered = extent(source, &(0..source.steps.len()));
         if anomalies_of.is_empty() {
             let reason = format!(
-                "steps cover {:.0} % or more of none of them from {} to {}; {} covers {covered}",
-                100.0 * least_share(step),
+                "none of them from {} to {} has steps over {}; {} covers {covered}",
                 window.start,
                 window.end,
+                least_in_words(step),
                 source.product
             );
             return Err(ContractError::invalid("step", step.as_str(), reason));
