@@ -28,11 +28,11 @@ fn scores_and_variances_are_those_of_an_independent_library() {
 /// The same script.
 #[test]
 fn autocorrelation_takes_significance_away() {
-    let found = mann_kendall(&SLOW, &detrended(&SLOW, 0.060_869_565_217_391_3)).unwrap();
+    let found = mann_kendall(&SLOW, &detrended(&SLOW, 0.060_869_565_217)).unwrap();
     assert_eq!(found.score, 173);
-    near(found.variance_correction, 5.496_717_315_594_243_5, 1e-9);
-    near(found.z, 1.309_704_571_974_194_9, 1e-9);
-    near(found.p_value, 0.190_295_796_318_001_5, 1e-8);
+    near(found.variance_correction, 5.377_692_310_401_308, 1e-9);
+    near(found.z, 1.324_119_160_166_555_6, 1e-9);
+    near(found.p_value, 0.185_463_473_168_971_6, 1e-8);
 }
 
 /// Noise that keeps much of itself from step to step has trends nearly as often as chance says; with what is found at every lag 17 and 24 of a
