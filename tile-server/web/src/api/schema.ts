@@ -2076,7 +2076,7 @@ export interface components {
             mid: components["schemas"]["TimeMs"];
             /** @description Unit of every slope. */
             slope_unit: string;
-            /** @description Means that it is drawn through; of months those that hold data over half of their time, of seasons and years over 95 % of it. */
+            /** @description Means that it is drawn through; of months those that hold data over half of their time, of seasons and years over half of each of their months. */
             step: components["schemas"]["TimeStep"];
             /** @description By the median of the slopes of all pairs. */
             theil_sen: components["schemas"]["TheilSenTrend"];
