@@ -229,7 +229,10 @@ fn what_is_no_such_thing_is_told_with_what_there_is_and_which_command_takes_it()
     let attach = ["attach", file, "--variable", "x"];
     fails(&attach, &["it is a file", "`fluxglobe ingest`"]);
     let profile = ["ingest", file, "--profile", "no-profile"];
-    fails(&profile, &["is none of", "takahashi09-flux, ", " more"]);
+    fails(
+        &profile,
+        &["is no file and none of", "takahashi09-flux, ", " more"],
+    );
     let dataset = ["observations", "query", "--dataset", "none"];
     fails(&dataset, &["there is no dataset none"]);
 

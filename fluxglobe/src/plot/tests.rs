@@ -183,7 +183,7 @@ fn bands_against_time_have_the_colours_of_the_quantity_and_a_bar_of_them() {
     made["min_coverage_percent"] = json!(40.0);
     made["left_out_count"] = json!(24);
     let svg = bands_of(made);
-    assert!(svg.contains("degrees of basins@1-0a1b2c3d:30 (north) and steps"));
+    assert!(svg.contains("degrees of basins@1-0a1b2c3d:30 (north), a month a row"));
     assert!(svg.contains("coverage of less than 40 %"));
 }
 
