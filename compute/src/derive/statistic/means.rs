@@ -74,12 +74,9 @@ impl MeanOf {
     /// Adds the value of one of its steps, NaN no data.
     pub(super) fn add(&self, sum: &mut Sum, step: usize, value: f32) {
         let step = step - self.steps.start;
-        for (month, shared_s) in self.in_months.get(step).into_iter().flatten() {
-            if sum.month != month + 1 {
-                sum.held_months = sum.held(&self.month_least_s);
-                (sum.month, sum.month_s) = (month + 1, 0.0);
-            }
-            sum.month_s += if value.is_nan() { 0.0 } else { *shared_s };
+        // Most means are no longer than months, and this is done for every value.
+        if !self.in_months.is_empty() {
+            self.add_to_months(sum, step, value);
         }
         if !value.is_nan() {
             let shared_s = self.shared_s[step];
@@ -88,10 +85,25 @@ impl MeanOf {
         }
     }
 
+    fn add_to_months(&self, sum: &mut Sum, step: usize, value: f32) {
+        for (month, shared_s) in &self.in_months[step] {
+            if sum.month != month + 1 {
+                sum.held_months = sum.held(&self.month_least_s);
+                (sum.month, sum.month_s) = (month + 1, 0.0);
+            }
+            sum.month_s += if value.is_nan() { 0.0 } else { *shared_s };
+        }
+    }
+
+    /// Does each of its months hold enough?
+    fn has_months(&self, sum: Sum) -> bool {
+        let least_s = &self.month_least_s;
+        least_s.is_empty() || usize::from(sum.held(least_s)) == least_s.len()
+    }
+
     /// The mean when all of its steps were added, NaN where too little of its time holds data.
     pub(super) fn mean(&self, sum: Sum) -> f64 {
-        let held_months = usize::from(sum.held(&self.month_least_s));
-        if sum.with_data_s >= self.least_s && held_months == self.month_least_s.len() {
+        if sum.with_data_s >= self.least_s && self.has_months(sum) {
             sum.values_s / sum.with_data_s
         } else {
             f64::NAN
