@@ -141,6 +141,9 @@ pub struct Style {
     // Spelt as in the names of pictures that are stored.
     #[serde(rename = "doubt", default, skip_serializing_if = "std::ops::Not::not")]
     pub uncertainty: bool,
+    /// Pixels have the value of the cell that they lie in, and gaps stay gaps: codes and directions have nothing between two of them.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub nearest: bool,
     /// Coast lines and the sea.
     #[serde(default, skip_serializing_if = "Context::is_empty")]
     pub context: Context,
@@ -204,6 +207,7 @@ impl Style {
             },
             globe_surface: false,
             uncertainty: false,
+            nearest: false,
             context: Context::default(),
         }
     }

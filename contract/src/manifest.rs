@@ -7,6 +7,7 @@ mod paged;
 
 use serde::{Deserialize, Serialize};
 
+use crate::analysis::MapStatistic;
 use crate::computed::Computed;
 use crate::digest::Digest;
 use crate::grid::Grid;
@@ -153,7 +154,15 @@ impl Manifest {
         })
     }
 
-    /// The two steps an instant lies between, and how far it has come from the first (0) to the second (1).
+    /// Is there something between two of its values? Not of codes and directions, and not of days of a year, of which the mean of the last
+    /// and the first is in July.
+    pub fn is_linear(&self) -> bool {
+        let statistic = self.computed.as_ref().and_then(|own| own.how.statistic());
+        self.quantity.is_linear() && statistic != Some(MapStatistic::Phase)
+    }
+
+    /// The two steps an instant lies between, and how far it has come from the first (0) to the second (1). Of values that have nothing
+    /// between two of them it is one step: the one that the instant lies in, else the nearer one.
     ///
     /// A step's mean holds at the middle of its period; before the first middle and after the last the nearest
     /// step holds. Accumulated carbon holds at the *end* of its period and grows from zero at the first start.
@@ -192,11 +201,29 @@ impl Manifest {
             });
         }
         let weight = share(at(&self.steps[after - 1]), at(&self.steps[after]));
+        if !self.is_linear() {
+            return Some(self.nearer(time, after, weight));
+        }
         Some(Bracket {
             before: Some(after - 1),
             after,
             weight,
         })
+    }
+
+    /// One of two steps whose middles an instant lies between, the second of them `after`.
+    fn nearer(&self, time: TimeMs, after: usize, weight: f64) -> Bracket {
+        let holds = |step: usize| {
+            let Period { start, end } = self.steps[step].period;
+            start <= time && time < end
+        };
+        let is_second = holds(after) || (!holds(after - 1) && weight >= 0.5);
+        let step = if is_second { after } else { after - 1 };
+        Bracket {
+            before: Some(step),
+            after: step,
+            weight: 0.0,
+        }
     }
 }
 
@@ -282,6 +309,34 @@ mod tests {
         );
         let half_way = at("2000-01-31T12:00:00Z"); // 15 of the 30 days between 16 Jan 12:00 and 15 Feb 12:00
         assert!((half_way.weight - 0.5).abs() < 1e-12);
+    }
+
+    #[test]
+    fn codes_and_directions_are_those_of_one_step() {
+        let direction = Quantity::open("wind_from_direction", "degree", "Wind direction").unwrap();
+        let mut m = manifest(direction);
+        // Of March nothing is there until its 20th.
+        m.steps[2].period.start = "2000-03-20".parse().unwrap();
+        for (time, step) in [
+            ("1999-01-01", 0),
+            ("2000-01-31T23:00:00Z", 0),
+            ("2000-02-01", 1),
+            ("2000-02-29T12:00:00Z", 1),
+            // In no step: middles are 15 February 12:00 and 25 March 24:00.
+            ("2000-03-05", 1),
+            ("2000-03-10", 2),
+            ("2000-03-20", 2),
+            ("2009-01-01", 2),
+        ] {
+            let bracket = m.bracket(time.parse().unwrap()).unwrap();
+            let one = Bracket {
+                before: Some(step),
+                after: step,
+                weight: 0.0,
+            };
+            assert_eq!(bracket, one, "{time}");
+        }
+        assert!(manifest(Quantity::CarbonFlux).is_linear());
     }
 
     #[test]

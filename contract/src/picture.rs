@@ -271,7 +271,10 @@ impl RenderJob {
             trails: None,
             mode,
             view,
-            style,
+            style: Style {
+                nearest: !product.is_linear(),
+                ..style
+            },
             annotations: None,
         };
         job.validate()?;

@@ -231,6 +231,23 @@ impl Quantity {
         }
     }
 
+    /// Of directions how many of its units a turn is; none of what is no angle.
+    pub fn units_per_turn(self) -> Option<f64> {
+        let Self::Open(_) = self else { return None };
+        match self.unit().to_lowercase().as_str() {
+            "deg" | "degree" | "degrees" | "°" | "degree_true" | "degrees_true" | "degreet"
+            | "degreest" | "degree_t" | "degrees_t" | "arc_degree" | "arc_degrees" => Some(360.0),
+            "rad" | "radian" | "radians" => Some(std::f64::consts::TAU),
+            _ => None,
+        }
+    }
+
+    /// Does what lies half-way between two of its values lie half-way between what they mean? Not of codes, and not of directions, of which the
+    /// mean of 359 and 1 degree is 0 and not 180.
+    pub fn is_linear(self) -> bool {
+        self.flags().is_empty() && self.units_per_turn().is_none()
+    }
+
     /// What a code means.
     pub fn meaning(self, code: f32) -> Option<&'static str> {
         #[expect(clippy::float_cmp, reason = "a code is one exact number")]

@@ -39,16 +39,10 @@ impl Method {
         let Quantity::Open(_) = quantity else {
             return Self::Mean;
         };
-        match quantity.unit().to_lowercase().as_str() {
-            "" | "1" => Self::Sample,
-            "deg" | "degree" | "degrees" | "°" | "degree_true" | "degrees_true" | "degreet"
-            | "degreest" | "degree_t" | "degrees_t" | "arc_degree" | "arc_degrees" => {
-                Self::Direction { turn: 360.0 }
-            }
-            "rad" | "radian" | "radians" => Self::Direction {
-                turn: std::f64::consts::TAU,
-            },
-            _ => Self::Mean,
+        match (quantity.unit(), quantity.units_per_turn()) {
+            ("" | "1", _) => Self::Sample,
+            (_, Some(turn)) => Self::Direction { turn },
+            (_, None) => Self::Mean,
         }
     }
 

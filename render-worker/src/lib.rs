@@ -16,6 +16,7 @@ pub mod pipeline;
 mod prefetch;
 pub mod server;
 pub mod source;
+mod unfilled;
 pub mod wire;
 
 pub use desk::Desk;

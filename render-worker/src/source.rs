@@ -20,6 +20,7 @@ use storage::{StorageError, Store};
 
 use crate::error::DrawError;
 use crate::large::{Large, MOST_WHOLE_CELLS};
+use crate::unfilled::Gaps;
 
 /// Domains kept; each has four bytes a cell.
 const MOST_DOMAINS: usize = 64;
@@ -44,8 +45,8 @@ pub struct Source {
     early_cancelled: AtomicU64,
 }
 
-/// A field, the domain that its gaps were filled for, and the counts that say what its sums lack, if that is drawn.
-type FieldKey = (ObjectKey, ObjectKey, Option<ObjectKey>);
+/// A field, the domain that its gaps were filled for, the counts that say what its sums lack, if that is drawn, and what became of its gaps.
+type FieldKey = (ObjectKey, ObjectKey, Option<ObjectKey>, Gaps);
 
 /// A field in memory.
 #[derive(Clone)]
@@ -204,7 +205,7 @@ impl Source {
         let northward = job.flow.as_ref().map(|flow| &flow.northward);
         // All at once: a store that is far away is waited for once.
         let ((domain, value), accumulated, northward, terrain) = tokio::try_join!(
-            self.interval(grid, &job.value, wanted),
+            self.interval(grid, (&job.value, Gaps::of(job)), wanted),
             other(job.accumulated.as_ref()),
             other(northward),
             self.any_terrain(job.relief.as_ref()),
@@ -231,7 +232,7 @@ impl Source {
         let Some(sample) = sample else {
             return Ok(None);
         };
-        let (_domain, interval) = self.interval(grid, sample, wanted).await?;
+        let (_domain, interval) = self.interval(grid, (sample, Gaps::Filled), wanted).await?;
         Ok(Some(interval))
     }
 
@@ -246,7 +247,7 @@ impl Source {
     async fn terrain(&self, relief: &Relief) -> Result<Terrain, DrawError> {
         let grid = relief.grid;
         // No domain: its gaps are not filled.
-        let key = (relief.field.clone(), relief.field.clone(), None);
+        let key = (relief.field.clone(), relief.field.clone(), None, Gaps::Left);
         let place = match self.fields.get_value_or_guard_async(&key).await {
             Ok(held) => {
                 let elevation = held.field;
@@ -277,12 +278,12 @@ impl Source {
     async fn interval(
         &self,
         grid: &Grid,
-        sample: &TimeSample,
+        (sample, gaps): (&TimeSample, Gaps),
         wanted: Wanted,
     ) -> Result<(Arc<Cells<u32>>, Interval), DrawError> {
         let counts = sample.contributed.clone().unwrap_or_default();
         let part = |field: &ObjectKey, counts: &Option<ObjectKey>| {
-            (field.clone(), sample.domain.clone(), counts.clone())
+            (field.clone(), sample.domain.clone(), counts.clone(), gaps)
         };
         let before = async {
             if let Some(field) = &sample.before {
@@ -319,7 +320,7 @@ impl Source {
         if let Some(held) = self.fields.get(&key) {
             return Ok(held.field);
         }
-        let (_, of_domain, counts) = &key;
+        let (_, of_domain, counts, _) = &key;
         let domain = self.domain(grid, of_domain);
         let (domain, lacking) =
             tokio::try_join!(domain, self.lacking(grid, of_domain, counts.as_ref()))?;
@@ -393,7 +394,7 @@ impl Source {
 
     /// A field from the store, gaps filled.
     async fn read(&self, grid: &Grid, key: &FieldKey) -> Result<Field, DrawError> {
-        let (field, of_domain, counts) = key;
+        let (field, of_domain, counts, gaps) = key;
         let reading = async {
             let read = storage::fields::read(&self.store, field, grid).await;
             read.map_err(|e| failed("a field", of_domain, e))
@@ -403,6 +404,9 @@ impl Source {
             self.domain(grid, of_domain),
             self.lacking(grid, of_domain, counts.as_ref()),
         )?;
+        if *gaps == Gaps::Left {
+            return Ok(uncertain(Field::new(values), lacking));
+        }
         let (renderer, of_grid) = (Arc::clone(&self.renderer), *grid);
         let fill = move || fill(&renderer, &of_grid, values, &domain);
         let filled = tokio::task::spawn_blocking(fill).await;

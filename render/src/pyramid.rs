@@ -84,7 +84,7 @@ fn suited_product(job: &RenderJob, scene: &Scene) -> Option<Scene> {
         if cell_px(&job.view, &finest.grid) >= least_px {
             return suited;
         }
-        let Some(coarser) = coarser(finest) else {
+        let Some(coarser) = joined(finest, job.style.nearest) else {
             return suited;
         };
         suited = Some(coarser);
@@ -101,6 +101,11 @@ fn halved(fine: &Grid) -> Option<Grid> {
 
 /// The same scene in blocks of two by two cells, if such blocks fit the earth; its terrain stays as it is.
 pub fn coarser(scene: &Scene) -> Option<Scene> {
+    joined(scene, false)
+}
+
+/// The same, of values that have nothing between two of them: a block has that of one of its cells.
+fn joined(scene: &Scene, has_no_mean: bool) -> Option<Scene> {
     let fine = &scene.grid;
     // Whether blocks fit is for all of a grid to say, so that windows of it are joined alike.
     let whole = match &scene.whole {
@@ -116,7 +121,15 @@ pub fn coarser(scene: &Scene) -> Option<Scene> {
         None => halved(fine)?,
     };
     let blocks = Blocks::new(fine, &grid, EARTH, Some(scene.domain.content()));
-    let mean = |field: &Arc<Field>| field.coarser_mean(|cells| blocks.mean(cells));
+    let mean = |field: &Arc<Field>| {
+        field.coarser_mean(|cells| {
+            if has_no_mean {
+                blocks.sample(cells)
+            } else {
+                blocks.mean(cells)
+            }
+        })
+    };
     let mass = |field: &Arc<Field>| field.coarser_mass(|cells| blocks.mass(cells));
     let both = |interval: &Interval, coarser: &dyn Fn(&Arc<Field>) -> Arc<Field>| Interval {
         before: coarser(&interval.before),
@@ -218,6 +231,20 @@ impl<'a> Blocks<'a> {
                 }
             }
             mean.mean().map_or(f32::NAN, |mean| mean as f32)
+        })
+    }
+
+    /// The value of the cell south-east of the middle, or else the first that there is: as levels of cubes have it.
+    fn sample(&self, values: &[f32]) -> Vec<f32> {
+        self.each(|_, cells| {
+            let held = cells.map(|(cell, _)| values[cell]);
+            let held: Vec<f32> = held.filter(|value| !is_missing(*value)).collect();
+            // Of a block the last of its four cells lies there.
+            match held[..] {
+                [] => f32::NAN,
+                [.., last] if held.len() == 4 => last,
+                [first, ..] => first,
+            }
         })
     }
 

@@ -25,6 +25,7 @@ use render::stages::fill::Form;
 use storage::Store;
 
 use crate::error::DrawError;
+use crate::unfilled::Gaps;
 use choice::Choice;
 use domain::Domain;
 use gaps::Coarse;
@@ -56,6 +57,7 @@ struct Part<'a> {
     grid: &'a Grid,
     choice: &'a Choice,
     sample: &'a TimeSample,
+    gaps: Gaps,
     /// How much of each cell of the window holds data in some step of this product.
     shares: Arc<Vec<u32>>,
 }
@@ -95,14 +97,16 @@ impl Large {
         };
         let choice = choice::choose(job, carbon);
         check_size(job, &choice)?;
-        let value = self.part(grid, &choice, &job.value).await?;
+        let value = self
+            .part(grid, &choice, (&job.value, Gaps::of(job)))
+            .await?;
         let accumulated = match &job.accumulated {
-            Some(sample) => Some(self.part(grid, &choice, sample).await?),
+            Some(sample) => Some(self.part(grid, &choice, (sample, Gaps::Filled)).await?),
             None => None,
         };
         let northward = job.flow.as_ref().map(|flow| &flow.northward);
         let northward = match northward {
-            Some(sample) => Some(self.part(grid, &choice, sample).await?),
+            Some(sample) => Some(self.part(grid, &choice, (sample, Gaps::Filled)).await?),
             None => None,
         };
         let own = self.interval(&value, None).await?;
@@ -153,7 +157,7 @@ impl Large {
         &self,
         grid: &'a Grid,
         choice: &'a Choice,
-        sample: &'a TimeSample,
+        (sample, gaps): (&'a TimeSample, Gaps),
     ) -> Result<Part<'a>, DrawError> {
         if sample.contributed.is_some() {
             return Err(DrawError::Large {
@@ -166,6 +170,7 @@ impl Large {
             grid,
             choice,
             sample,
+            gaps,
             shares: Arc::new(self.shares(grid, &sample.domain, choice).await?),
         })
     }
@@ -243,7 +248,7 @@ impl Large {
         }
         let is_gap = |(value, share): (&f32, &u32)| *share != 0 && !value.is_finite();
         let has_gaps = values.iter().zip(&*part.shares).any(is_gap);
-        let coarse = if has_gaps {
+        let coarse = if has_gaps && part.gaps == Gaps::Filled {
             Some(self.coarse(part, field).await?)
         } else {
             None

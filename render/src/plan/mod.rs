@@ -378,6 +378,7 @@ fn common(job: &RenderJob, scene: &Scene) -> Params {
             has_shape: u32::from(shape::is_given(transfer)),
             has_uncertainty: u32::from(style.uncertainty && scene.value.has_uncertainty()),
             has_coverage: u32::from(scene.domain.is_joined()),
+            is_nearest: u32::from(style.nearest),
         },
         particles: ParticleParams {
             jitter_shift: look.jitter_shift,

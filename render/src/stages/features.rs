@@ -70,6 +70,8 @@ features! { params;
     HAS_ACCUMULATED: params.values.has_accumulated == 1,
     /// Colours are those of logarithms.
     IS_LOG: params.values.is_log == 1,
+    /// Pixels of a thematic map have the value of their cell.
+    IS_NEAREST: params.values.is_nearest == 1,
     /// The range of colours lies on both sides of zero.
     IS_DIVERGING: params.particles.diverging == 1,
     /// Particles are lit.

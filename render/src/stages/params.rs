@@ -148,6 +148,8 @@ shared_struct! {
         pub has_coverage: u32,
         /// 1: the two numbers of the transfer function are those of binary logarithms.
         pub is_log: u32,
+        /// 1: a pixel has the value of the cell that it lies in.
+        pub is_nearest: u32,
     }
 }
 

@@ -21,7 +21,7 @@ struct GridParams {
 // How stored values are read: between which of their steps, and as which colour.
 struct ValueParams {
     weight: f32, accumulated_weight: f32, northward_weight: f32, has_accumulated: u32, transfer_low: f32,
-    transfer_per_unit: f32, has_shape: u32, has_uncertainty: u32, has_coverage: u32, is_log: u32,
+    transfer_per_unit: f32, has_shape: u32, has_uncertainty: u32, has_coverage: u32, is_log: u32, is_nearest: u32,
 }
 @group(0) @binding(18) var<uniform> values: ValueParams;
 

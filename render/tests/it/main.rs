@@ -9,6 +9,7 @@ mod adapters;
 mod bands;
 mod below;
 mod coast;
+mod codes;
 mod compare;
 mod context;
 mod device;

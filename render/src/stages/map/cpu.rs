@@ -110,8 +110,20 @@ fn mix(a: Vec3, b: Vec3, t: f32) -> Vec3 {
     a * (1.0 - t) + b * t
 }
 
-fn colour_at(params: &Params, inputs: &Inputs<'_>, [x, y]: [Axis; 2], pixel: [u32; 2]) -> Vec4 {
+/// The cell that a place lies in, where cells have nothing between them.
+pub(super) fn in_cell(params: &Params, place: Axis) -> Axis {
+    if params.values.is_nearest == 1 {
+        return Axis {
+            index: place.index + i32::from(place.fraction >= 0.5),
+            fraction: 0.0,
+        };
+    }
+    place
+}
+
+fn colour_at(params: &Params, inputs: &Inputs<'_>, place: [Axis; 2], pixel: [u32; 2]) -> Vec4 {
     let palette = inputs.palette;
+    let [x, y] = place.map(|axis| in_cell(params, axis));
     let cell = |row, col| cell_value(params, inputs, row, col);
     let north = mix(
         cell(y.index, x.index),

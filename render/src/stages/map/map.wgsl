@@ -33,7 +33,17 @@ fn uncertainty_at(x: Axis, y: Axis) -> f32 {
     return mix(north, south, y.fraction);
 }
 
-fn colour_at(x: Axis, y: Axis, pixel: vec2<u32>) -> vec4<f32> {
+// The cell that a place lies in, where cells have nothing between them.
+fn in_cell(place: Axis) -> Axis {
+    if (feature(IS_NEAREST, values.is_nearest == 1u)) {
+        return Axis(place.index + select(0, 1, place.fraction >= 0.5), 0.0);
+    }
+    return place;
+}
+
+fn colour_at(across: Axis, down: Axis, pixel: vec2<u32>) -> vec4<f32> {
+    let x = in_cell(across);
+    let y = in_cell(down);
     let north = mix(cell_value(y.index, x.index), cell_value(y.index, x.index + 1), x.fraction);
     let south = mix(cell_value(y.index + 1, x.index), cell_value(y.index + 1, x.index + 1), x.fraction);
     let value = mix(north, south, y.fraction);

@@ -7,7 +7,7 @@
 
 use contract::job::{Mode, RenderJob, View};
 
-use super::cpu::cell_at;
+use super::cpu::{cell_at, in_cell};
 use crate::plan::Plan;
 use crate::scene::Scene;
 use crate::stages::interpolate::cpu::interpolated;
@@ -46,7 +46,12 @@ pub fn draw(plan: &Plan, scene: &Scene) -> Vec<u8> {
         domain: scene.domain.content(),
     };
     let [width, height] = plan.size_px().map(|px| px as usize);
-    let (cols, rows) = plan.axes.split_at(width);
+    let axes: Vec<Axis> = plan
+        .axes
+        .iter()
+        .map(|axis| in_cell(&plan.params, *axis))
+        .collect();
+    let (cols, rows) = axes.split_at(width);
     let colours = Colours::of(plan);
     let mut image = Vec::with_capacity(width * height * 4);
     let mut sides = [Along::of(width), Along::of(width)];

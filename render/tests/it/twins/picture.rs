@@ -43,7 +43,14 @@ fn map_matches_its_twin_on_tiles_and_on_the_globe() {
             "alpha *= value.z",
         )
     });
-    for (twins, right, wrong) in plain.into_iter().chain(uncertain).chain(joined) {
+    let nearest = views.map(|view| {
+        let of_cells = Twins::styled(Mode::Map, view, ocean(FIVE_DEGREES), |style| {
+            style.nearest = true;
+        });
+        (of_cells, "place.fraction >= 0.5", "place.fraction >= 0.3")
+    });
+    let all = plain.into_iter().chain(uncertain).chain(joined);
+    for (twins, right, wrong) in all.chain(nearest) {
         let expected = channels(&twins.picture);
         prove("map", map::SOURCE, right, wrong, |gpu, source| {
             let stage = Map::new(gpu, source);
@@ -75,6 +82,11 @@ fn a_tile_drawn_in_one_has_the_bytes_of_its_stages() {
             style.transfer.scale = Scale::Log;
         })
     };
+    let nearest = |view| {
+        Twins::styled(Mode::Map, view, ocean(FIVE_DEGREES), |style| {
+            style.nearest = true;
+        })
+    };
     // The whole world, across the date line, a coast, and fewer cells than pixels; of other sizes too.
     let views = [
         tile(0, 0, 0, 256),
@@ -89,6 +101,7 @@ fn a_tile_drawn_in_one_has_the_bytes_of_its_stages() {
             Twins::joined(Mode::Map, view),
             shaped(view),
             logarithmic(view),
+            nearest(view),
         ] {
             assert!(plain::suits(&twins.plan));
             let drawn = plain::draw(&twins.plan, &twins.scene);
