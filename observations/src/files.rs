@@ -248,12 +248,8 @@ impl ObservationStore for FileStore {
                 lat_deg: o.lat_deg,
             }));
             places.dedup_by_key(|place| place.time);
-            if places.len() >= query.limit as usize {
-                places.truncate(query.limit as usize);
-                break;
-            }
         }
-        Ok(places)
+        Ok(track::thinned(places, query.limit))
     }
 
     async fn ready(&self) -> Result<(), ObservationError> {

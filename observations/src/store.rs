@@ -42,7 +42,7 @@ pub trait ObservationStore: Send + Sync {
     /// looked at.
     async fn platforms(&self, filter: &Filter) -> Result<Vec<Platform>, ObservationError>;
 
-    /// The way of a platform in the order of time, one place for each time.
+    /// The way of a platform in the order of time, one place for each time, thinned to the limit.
     async fn track(&self, query: &TrackQuery) -> Result<Vec<TrackPoint>, ObservationError>;
 
     /// Can observations be stored and asked for now? Answers within two seconds.

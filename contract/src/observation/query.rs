@@ -106,7 +106,8 @@ pub struct TrackQuery {
     pub from: Option<TimeMs>,
     /// First instant that is too late.
     pub to: Option<TimeMs>,
-    /// Most places, 1 to [`MAX_PLACES`]; the first ones are given.
+    /// Most places, 1 to [`MAX_PLACES`]. Of a way with more every n-th is given, and its first and last place always; of a
+    /// limit of one the last.
     pub limit: u32,
 }
 

@@ -90,7 +90,7 @@ pub(super) fn platforms<'a>(checked: &'a CheckedFilter<'_>) -> Question<'a> {
     question
 }
 
-/// One place for each time of a platform.
+/// One place for each time of a platform; of more than the limit those that `track::thinned` keeps.
 pub(super) fn track(query: &TrackQuery) -> Question<'_> {
     let mut question = Question::new();
     let mut wanted = vec![
@@ -109,10 +109,14 @@ pub(super) fn track(query: &TrackQuery) -> Question<'_> {
             question.parameter(system_time(to))
         ));
     }
-    let limit = question.parameter(i64::from(query.limit));
+    let gaps = question.parameter(i64::from(query.limit) - 1);
     question.sql = format!(
-        "SELECT DISTINCT ON (obs_time) obs_time, ST_X(place), ST_Y(place) FROM observation {} \
-         ORDER BY obs_time, property, depth_m LIMIT {limit}",
+        "WITH way AS (SELECT DISTINCT ON (obs_time) obs_time, ST_X(place) AS lon, ST_Y(place) AS lat FROM observation {} \
+             ORDER BY obs_time, property, depth_m), \
+         numbered AS (SELECT obs_time, lon, lat, row_number() OVER (ORDER BY obs_time) - 1 AS nth, count(*) OVER () - 1 AS final \
+             FROM way) \
+         SELECT obs_time, lon, lat FROM numbered WHERE nth = final OR {gaps}::bigint > 0 \
+             AND nth % greatest((final + {gaps}::bigint - 1) / greatest({gaps}::bigint, 1), 1) = 0 ORDER BY obs_time",
         all_of(&wanted)
     );
     question

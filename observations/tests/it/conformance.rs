@@ -43,6 +43,7 @@ suite! {
     asking::a_filter_finds_what_it_names_and_nothing_else,
     asking::platforms_are_summed_up_over_what_is_wanted,
     asking::a_track_has_one_place_for_each_time,
+    asking::a_long_track_is_thinned_and_ends_where_it_ends,
     asking::questions_beyond_their_limits_are_refused,
     asking::an_empty_home_is_ready_and_answers_with_nothing,
 }

@@ -301,7 +301,7 @@ pub(crate) async fn a_track_has_one_place_for_each_time(home: &Home) {
         limit: 2,
         ..query.clone()
     };
-    assert_eq!(lons(&two).await, [1.0, 2.0]);
+    assert_eq!(lons(&two).await, [1.0, 3.0]);
     let late = TrackQuery {
         from: Some(rows[3].time),
         to: Some(rows[0].time),
@@ -313,6 +313,34 @@ pub(crate) async fn a_track_has_one_place_for_each_time(home: &Home) {
         ..query
     };
     assert!(lons(&nobody).await.is_empty());
+}
+
+pub(crate) async fn a_long_track_is_thinned_and_ends_where_it_ends(home: &Home) {
+    let store = home.store();
+    // Over some months, so that it lies in several files.
+    let way: Vec<_> = (0..5000)
+        .map(|at| Observation {
+            lon_deg: f64::from(at) / 100.0,
+            ..observation("ship", i64::from(at) * 30, 1.0)
+        })
+        .collect();
+    store.upsert(&way).await.unwrap();
+    for (limit, expected) in [(1, 1), (2, 2), (100, 100), (4999, 2501), (5000, 5000)] {
+        let query = TrackQuery {
+            limit,
+            ..TrackQuery::new("buoys".parse().unwrap(), "ship")
+        };
+        let track = store.track(&query).await.unwrap();
+        assert_eq!(track.len(), expected, "{limit}");
+        assert!(track.is_sorted_by_key(|point| point.time));
+        let last = &track[track.len() - 1];
+        assert_eq!((last.time, last.lon_deg), (way[4999].time, 49.99));
+        if limit > 1 {
+            assert_eq!((track[0].time, track[0].lon_deg), (way[0].time, 0.0));
+            let every = (track[1].lon_deg * 100.0).round() as usize;
+            assert_eq!(track[1].time, way[every].time, "the places of the way");
+        }
+    }
 }
 
 pub(crate) async fn questions_beyond_their_limits_are_refused(home: &Home) {
