@@ -95,6 +95,15 @@ pub struct Platform {
     pub count: u64,
 }
 
+/// Platforms by dataset and name.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PlatformList {
+    /// The first ones, no more than the limit.
+    pub platforms: Vec<Platform>,
+    /// Are these all that the question is about?
+    pub is_complete: bool,
+}
+
 /// Whose way is wanted, and when.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrackQuery {

@@ -66,11 +66,12 @@ pub(super) fn observations<'a>(checked: &'a CheckedFilter<'_>) -> Question<'a> {
     question
 }
 
-/// Platforms of the wanted rows; the last row of a platform is that of its latest time, then first property, least depth.
+/// Platforms of the wanted rows, one more than the limit; the last row of a platform is that of its latest time, then first
+/// property, least depth.
 pub(super) fn platforms<'a>(checked: &'a CheckedFilter<'_>) -> Question<'a> {
     let mut question = Question::new();
     let wanted = conditions(&mut question, checked);
-    let limit = question.parameter(i64::from(checked.filter.limit));
+    let limit = question.parameter(i64::from(checked.filter.limit) + 1);
     question.sql = format!(
         "WITH wanted AS (SELECT dataset, platform, kind, obs_time, ST_X(place) AS lon, ST_Y(place) AS lat, property, depth_m \
              FROM observation {}), \
@@ -88,6 +89,18 @@ pub(super) fn platforms<'a>(checked: &'a CheckedFilter<'_>) -> Question<'a> {
         all_of(&wanted)
     );
     question
+}
+
+/// Datasets by name, each found by the index from the one before it.
+pub(super) fn datasets() -> Question<'static> {
+    let sql = "WITH RECURSIVE known AS (SELECT min(dataset) AS dataset FROM observation UNION ALL \
+             SELECT (SELECT min(dataset) FROM observation WHERE dataset > known.dataset) FROM known \
+             WHERE known.dataset IS NOT NULL) \
+         SELECT dataset FROM known WHERE dataset IS NOT NULL ORDER BY dataset";
+    Question {
+        sql: sql.to_owned(),
+        parameters: vec![],
+    }
 }
 
 /// One place for each time of a platform; of more than the limit those that `track::thinned` keeps.
