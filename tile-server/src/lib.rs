@@ -36,6 +36,7 @@ mod client;
 pub mod config;
 mod connections;
 mod cubes;
+mod derivations;
 mod edition;
 pub mod error;
 mod extract;
