@@ -52,6 +52,7 @@ mod openapi;
 mod pictures;
 mod readiness;
 mod request;
+mod rooms;
 mod router;
 mod routes;
 mod serve;

@@ -15,12 +15,12 @@ use serde::Deserialize;
 use utoipa::IntoParams;
 
 use crate::backend::{SeriesQuestion, Version};
-use crate::bodies::Room;
 use crate::catalogue::Layer;
 use crate::error::ServerError;
 use crate::extract::{UrlPath, UrlQuery, left_out, number, parsed, time};
 use crate::masks;
 use crate::openapi::words::GeoJson;
+use crate::rooms::Room;
 use crate::routes::budget::ocean;
 use crate::state::AppState;
 

@@ -21,12 +21,12 @@ use serde::Deserialize;
 use utoipa::IntoParams;
 
 use super::statistics::{form, response};
-use crate::bodies::Room;
 use crate::catalogue::Layer;
 use crate::error::ServerError;
 use crate::extract::{UrlPath, UrlQuery, left_out, number, parsed, time, whole_number};
 use crate::masks;
 use crate::openapi::words::GeoJson;
+use crate::rooms::Room;
 use crate::state::AppState;
 
 #[derive(Debug, Deserialize, IntoParams)]
