@@ -10,6 +10,7 @@ use observations::ObservationStore;
 
 use crate::cli::{MatchTime, Matchup, Observations, ObservationsAsked, Settings};
 use crate::command::budget;
+use crate::instants::Instants;
 use crate::{deployment, plot, progress};
 
 pub(crate) async fn run(settings: &Settings, command: Observations) -> Result<()> {
@@ -73,13 +74,14 @@ async fn list(settings: &Settings, asked: &ObservationsAsked) -> Result<()> {
         "values",
         "properties",
     ]);
+    let instants = Instants::of(platforms.iter().flat_map(|p| [p.first, p.last]));
     for p in platforms {
         table.add_row([
             p.dataset.to_string(),
             p.platform,
             p.kind.to_string(),
-            progress::day(p.first),
-            progress::day(p.last),
+            instants.text(p.first),
+            instants.text(p.last),
             format!("{:.3}, {:.3}", p.lon_deg, p.lat_deg),
             p.count.to_string(),
             p.properties.join(" "),
