@@ -45,12 +45,18 @@ mod tests {
     fn hours_are_told_where_days_would_not_tell_a_start_from_its_end() {
         let instant = |text: &str| -> TimeMs { text.parse().unwrap() };
         let days = ["2000-01-01", "2000-02-01"].map(instant);
-        assert_eq!(days.map(|one| Instants::of(days).text(one)), ["2000-01-01", "2000-02-01"]);
+        assert_eq!(
+            days.map(|one| Instants::of(days).text(one)),
+            ["2000-01-01", "2000-02-01"]
+        );
         let halves = ["2000-01-01", "2000-01-01T12:00", "1969-12-31T23:30"].map(instant);
         assert_eq!(
             halves.map(|one| Instants::of(halves).text(one)),
             ["2000-01-01T00:00", "2000-01-01T12:00", "1969-12-31T23:30"]
         );
-        assert_eq!(halves.map(shown), ["2000-01-01", "2000-01-01T12:00", "1969-12-31T23:30"]);
+        assert_eq!(
+            halves.map(shown),
+            ["2000-01-01", "2000-01-01T12:00", "1969-12-31T23:30"]
+        );
     }
 }

@@ -141,7 +141,9 @@ impl Older {
         id: &ManifestId,
     ) -> Result<Option<u64>, StorageError> {
         let mut sources = stream::iter(numbers.iter().rev().copied())
-            .map(|number| async move { Ok::<_, StorageError>((number, self.source(number).await?)) })
+            .map(
+                |number| async move { Ok::<_, StorageError>((number, self.source(number).await?)) },
+            )
             .buffered(AT_ONCE);
         while let Some((number, source)) = sources.try_next().await? {
             if source.as_ref() == Some(id) {

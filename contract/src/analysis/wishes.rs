@@ -53,7 +53,11 @@ impl SeriesWishes {
             && (self.place.is_some() || self.line.is_some())
         {
             let reason = "how much of a cell is sea counts in regions alone: leave it out";
-            return Err(ContractError::invalid("ocean", ocean.product.as_str(), reason));
+            return Err(ContractError::invalid(
+                "ocean",
+                ocean.product.as_str(),
+                reason,
+            ));
         }
         Ok(match (self.place, self.region, self.line) {
             (Some(place), None, None) => Some(SeriesQuery::Cell {
@@ -116,8 +120,7 @@ impl AnalysisWishes {
     fn check_options(&self) -> Result<(), ContractError> {
         let is_asked = |part| self.parts.contains(&part);
         if !is_asked(AnalysisPart::Climatology) && !is_asked(AnalysisPart::Anomaly) {
-            let reason =
-                "it belongs to the climatology and the anomaly: ask for one of them, or leave it out";
+            let reason = "it belongs to the climatology and the anomaly: ask for one of them, or leave it out";
             if let Some(base) = self.base {
                 return Err(ContractError::invalid("base", &base.to_string(), reason));
             }

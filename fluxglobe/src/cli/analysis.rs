@@ -265,13 +265,19 @@ mod tests {
             Line::parse_from(words).analysis.asked(None)
         };
         assert_eq!(asked("").unwrap(), None);
-        for right in ["--trend --trend-step year", "--anomaly --bins season --base 1991/2020"] {
+        for right in [
+            "--trend --trend-step year",
+            "--anomaly --bins season --base 1991/2020",
+        ] {
             assert!(asked(right).unwrap().is_some(), "{right}");
         }
         for (words, said) in [
             ("--base 1991/2020", "the climatology and the anomaly"),
             ("--bins season", "the climatology and the anomaly"),
-            ("--trend --base 1991/2020", "the climatology and the anomaly"),
+            (
+                "--trend --base 1991/2020",
+                "the climatology and the anomaly",
+            ),
             ("--trend-step year", "the trend"),
             ("--climatology --trend-step year", "the trend"),
         ] {

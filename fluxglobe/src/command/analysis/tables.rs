@@ -192,7 +192,9 @@ fn season(made: &Season, unit: &str) -> String {
 
 fn extremes(made: &Extremes, unit: &str) -> String {
     let pairs = made.highest.iter().zip(&made.lowest);
-    let starts = pairs.clone().flat_map(|(high, low)| [high.start, low.start]);
+    let starts = pairs
+        .clone()
+        .flat_map(|(high, low)| [high.start, low.start]);
     let instants = Instants::of(starts);
     let rows = pairs.map(|(high, low)| {
         vec![
