@@ -11,7 +11,9 @@ use crate::ContractError;
 use crate::grid::LonLatDeg;
 use crate::product::ProductId;
 use crate::time::TimeMs;
-pub use query::{Filter, MAX_LIMIT, MAX_PLACES, Page, Platform, TrackPoint, TrackQuery};
+pub use query::{
+    Filter, MAX_LIMIT, MAX_PLACES, Page, Platform, PlatformList, TrackPoint, TrackQuery,
+};
 
 /// Deepest and highest place of a measurement, m below the surface.
 const DEPTH_M: std::ops::RangeInclusive<f64> = -1000.0..=12_000.0;

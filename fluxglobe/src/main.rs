@@ -9,6 +9,7 @@ mod deployment;
 mod desktop;
 mod file_handles;
 mod heights;
+mod instants;
 mod picture;
 mod plot;
 mod ports;

@@ -70,8 +70,3 @@ pub(crate) fn result(text: &str) -> anyhow::Result<()> {
         outcome => Ok(outcome?),
     }
 }
-
-/// The day of an instant, for tables.
-pub(crate) fn day(time: contract::time::TimeMs) -> String {
-    time.to_string()[..10].to_owned()
-}

@@ -13,7 +13,7 @@ use std::time::Duration;
 use async_trait::async_trait;
 use contract::digest::Digest;
 use contract::key::ObjectKey;
-use contract::observation::{Filter, Observation, Page, Platform, TrackPoint, TrackQuery};
+use contract::observation::{Filter, Observation, Page, PlatformList, TrackPoint, TrackQuery};
 use contract::product::ProductId;
 use contract::time::TimeMs;
 use futures::{StreamExt as _, TryStreamExt as _, stream};
@@ -23,7 +23,7 @@ use storage::Store;
 use crate::error::ObservationError;
 use crate::filter::{self, CheckedFilter};
 use crate::key::Key;
-use crate::platform::Gathering;
+use crate::platform::{self, Gathering};
 use crate::store::{Counts, ObservationStore};
 use crate::{batch, key, track};
 use index::{Index, Month};
@@ -218,7 +218,7 @@ impl ObservationStore for FileStore {
         Ok(filter::page(rows, filter.limit))
     }
 
-    async fn platforms(&self, filter: &Filter) -> Result<Vec<Platform>, ObservationError> {
+    async fn platforms(&self, filter: &Filter) -> Result<PlatformList, ObservationError> {
         let checked = CheckedFilter::new(filter)?;
         let mut gathering = Gathering::default();
         for (_, months) in self.months(&checked).await? {
@@ -226,7 +226,11 @@ impl ObservationStore for FileStore {
                 gathering.add(row);
             }
         }
-        Ok(gathering.finish(filter.limit))
+        Ok(platform::list(gathering.finish(), filter.limit))
+    }
+
+    async fn datasets(&self) -> Result<Vec<ProductId>, ObservationError> {
+        index::datasets(&self.store).await
     }
 
     async fn track(&self, query: &TrackQuery) -> Result<Vec<TrackPoint>, ObservationError> {
@@ -248,12 +252,8 @@ impl ObservationStore for FileStore {
                 lat_deg: o.lat_deg,
             }));
             places.dedup_by_key(|place| place.time);
-            if places.len() >= query.limit as usize {
-                places.truncate(query.limit as usize);
-                break;
-            }
         }
-        Ok(places)
+        Ok(track::thinned(places, query.limit))
     }
 
     async fn ready(&self) -> Result<(), ObservationError> {

@@ -21,7 +21,9 @@ mod settings;
 mod store;
 mod track;
 
-pub use contract::observation::{Filter, MAX_LIMIT, Page, Platform, TrackPoint, TrackQuery};
+pub use contract::observation::{
+    Filter, MAX_LIMIT, Page, Platform, PlatformList, TrackPoint, TrackQuery,
+};
 pub use error::{ErrorClass, ObservationError};
 pub use files::FileStore;
 pub use gc::Datasets;

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use contract::observation::{Observation, Platform};
+use contract::observation::{Observation, Platform, PlatformList};
 use contract::product::ProductId;
 use contract::time::TimeMs;
 
@@ -17,6 +17,18 @@ pub(crate) fn bounds_deg(plain: [f64; 2], eastward: [f64; 2], lat: [f64; 2]) -> 
     };
     let turn_deg = if west >= 180.0 { -360.0 } else { 0.0 };
     [west + turn_deg, lat[0], east + turn_deg, lat[1]]
+}
+
+/// At most `limit` platforms of those that there are, which are one more than the limit at least if there are more.
+pub(crate) fn list(platforms: impl Iterator<Item = Platform>, limit: u32) -> PlatformList {
+    let limit = limit as usize;
+    let mut platforms: Vec<Platform> = platforms.take(limit + 1).collect();
+    let is_complete = platforms.len() <= limit;
+    platforms.truncate(limit);
+    PlatformList {
+        platforms,
+        is_complete,
+    }
 }
 
 /// Longitude in [0, 360).
@@ -72,10 +84,9 @@ impl Gathering {
         }
     }
 
-    /// At most `limit` platforms, by dataset and name.
-    pub(crate) fn finish(self, limit: u32) -> Vec<Platform> {
-        let platforms = self
-            .found
+    /// Platforms by dataset and name.
+    pub(crate) fn finish(self) -> impl Iterator<Item = Platform> {
+        self.found
             .into_iter()
             .map(|((dataset, platform), g)| Platform {
                 dataset,
@@ -88,8 +99,7 @@ impl Gathering {
                 lat_deg: g.last.lat_deg,
                 properties: g.properties.into_iter().collect(),
                 count: g.count,
-            });
-        platforms.take(limit as usize).collect()
+            })
     }
 }
 
@@ -124,7 +134,7 @@ mod tests {
                 ..observation("s", 1.0)
             });
         }
-        let ship = gathering.finish(10).remove(0);
+        let ship = gathering.finish().next().unwrap();
         assert_eq!(ship.bounds_deg, [179.0, -0.0, 182.0, -0.0]);
         assert_eq!((ship.lon_deg, ship.count), (-178.0, 3));
         assert_eq!(bounds_deg([-10.0, 5.0], [5.0, 350.0], [0.0; 2])[0], -10.0);

@@ -6,14 +6,17 @@ mod row;
 mod upsert;
 
 use async_trait::async_trait;
-use contract::observation::{Filter, Observation, Page, Platform, TrackPoint, TrackQuery};
+use contract::observation::{
+    Filter, Observation, Page, Platform, PlatformList, TrackPoint, TrackQuery,
+};
+use contract::product::ProductId;
 use tokio_postgres::types::ToSql;
 
 use crate::error::ObservationError;
 use crate::filter::{self, CheckedFilter};
 use crate::settings::DatabaseSettings;
 use crate::store::{Counts, ObservationStore};
-use crate::{batch, track};
+use crate::{batch, platform, track};
 use pool::Connections;
 use question::Question;
 
@@ -66,11 +69,17 @@ impl ObservationStore for PostgisStore {
         Ok(filter::page(observations, filter.limit))
     }
 
-    async fn platforms(&self, filter: &Filter) -> Result<Vec<Platform>, ObservationError> {
+    async fn platforms(&self, filter: &Filter) -> Result<PlatformList, ObservationError> {
         let checked = CheckedFilter::new(filter)?;
         let question = question::platforms(&checked);
         let rows = self.rows("reading platforms", &question).await?;
-        rows.iter().map(row::platform).collect()
+        let platforms: Vec<Platform> = rows.iter().map(row::platform).collect::<Result<_, _>>()?;
+        Ok(platform::list(platforms.into_iter(), filter.limit))
+    }
+
+    async fn datasets(&self) -> Result<Vec<ProductId>, ObservationError> {
+        let rows = self.rows("reading datasets", &question::datasets()).await?;
+        rows.iter().map(row::dataset).collect()
     }
 
     async fn track(&self, query: &TrackQuery) -> Result<Vec<TrackPoint>, ObservationError> {

@@ -1,7 +1,8 @@
 //! The one trait of both homes of observations.
 
 use async_trait::async_trait;
-use contract::observation::{Filter, Observation, Page, Platform, TrackPoint, TrackQuery};
+use contract::observation::{Filter, Observation, Page, PlatformList, TrackPoint, TrackQuery};
+use contract::product::ProductId;
 use serde::{Deserialize, Serialize};
 
 use crate::error::ObservationError;
@@ -38,11 +39,14 @@ pub trait ObservationStore: Send + Sync {
     /// Observations by time, dataset, platform, property and depth, a page at a time.
     async fn query(&self, filter: &Filter) -> Result<Page, ObservationError>;
 
-    /// The platforms of the observations that a filter wants, by dataset and name, at most its limit; `after` is not
-    /// looked at.
-    async fn platforms(&self, filter: &Filter) -> Result<Vec<Platform>, ObservationError>;
+    /// The platforms of the observations that a filter wants, by dataset and name, at most its limit, and whether these are
+    /// all; `after` is not looked at.
+    async fn platforms(&self, filter: &Filter) -> Result<PlatformList, ObservationError>;
 
-    /// The way of a platform in the order of time, one place for each time.
+    /// All datasets that there are observations of, by name.
+    async fn datasets(&self) -> Result<Vec<ProductId>, ObservationError>;
+
+    /// The way of a platform in the order of time, one place for each time, thinned to the limit.
     async fn track(&self, query: &TrackQuery) -> Result<Vec<TrackPoint>, ObservationError>;
 
     /// Can observations be stored and asked for now? Answers within two seconds.

@@ -1,4 +1,4 @@
-//! The limits of a question for the way of one platform.
+//! The limits of a question for the way of one platform, and which places of a long way are its answer.
 
 use contract::ContractError;
 use contract::observation::{MAX_PLACES, TrackQuery};
@@ -23,4 +23,42 @@ pub(crate) fn check(query: &TrackQuery) -> Result<(), ContractError> {
         return Err(ContractError::invalid("platform", &query.platform, reason));
     }
     check_span(query.from, query.to)
+}
+
+/// Of a way from its first to its last place at most `limit` places: every n-th, n as small as may be, and the last.
+///
+/// `question::track` says the same in SQL.
+pub(crate) fn thinned<T>(way: Vec<T>, limit: u32) -> Vec<T> {
+    let Some(last) = way.len().checked_sub(1) else {
+        return way;
+    };
+    let gaps = limit.saturating_sub(1) as usize;
+    let every = last.div_ceil(gaps.max(1)).max(1);
+    let is_kept = |at: usize| at == last || gaps > 0 && at.is_multiple_of(every);
+    let places = way.into_iter().enumerate();
+    places
+        .filter_map(|(at, place)| is_kept(at).then_some(place))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_way_keeps_its_ends_and_no_more_than_its_limit_between() {
+        for count in [1_usize, 2, 3, 99, 100, 101, 199, 200, 5000] {
+            for limit in [2_u32, 3, 100, 5000] {
+                let kept = thinned((0..count).collect(), limit);
+                assert!(kept.len() <= limit as usize, "{count} by {limit}");
+                assert_eq!((kept[0], kept[kept.len() - 1]), (0, count - 1));
+                let is_whole = kept.len() == count;
+                assert_eq!(is_whole, count <= limit as usize, "{count} by {limit}");
+            }
+            assert_eq!(thinned((0..count).collect(), 1), [count - 1]);
+        }
+        assert!(thinned(Vec::<usize>::new(), 1).is_empty());
+        let kept = thinned((0..10).collect(), 5);
+        assert_eq!(kept, [0, 3, 6, 9]);
+    }
 }

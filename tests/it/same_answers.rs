@@ -191,6 +191,16 @@ fn refused_alike(data: &Path, server: &Server) {
             "budget/history?step=month",
             "one number",
         ),
+        (
+            "--history --river-flux 650 --river-source somebody",
+            "budget/history?river_flux=650&river_source=somebody",
+            "takes no rivers off",
+        ),
+        (
+            "--history --error 1% --correlation-length-km 9 --monte-carlo 20",
+            "budget/history?error=1%25&correlation_length_km=9&monte_carlo=20",
+            "draws no errors",
+        ),
         ("--regions {}", "budget?regions=%7B%7D", "GeoJSON"),
         (
             "--error 1% --correlation-length-km 9 --monte-carlo 99999",

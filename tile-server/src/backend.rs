@@ -19,7 +19,8 @@ use contract::encoding::Encoding;
 use contract::grid::LonLatDeg;
 use contract::job::RenderJob;
 use contract::manifest::{Manifest, ManifestId};
-use contract::observation::{Filter, Page, Platform, TrackPoint, TrackQuery};
+use contract::observation::{Filter, Page, PlatformList, TrackPoint, TrackQuery};
+use contract::product::ProductId;
 use contract::region::{AskedRegion, MaskCode};
 use contract::rows::{Columns, RowsForm};
 use contract::series::{PointSeries, RegionSeries, RegionSeriesQuery};
@@ -194,8 +195,11 @@ pub trait Analyse: Send + Sync + 'static {
 /// Finds observations of buoys, ships, stations and profiles.
 #[async_trait]
 pub trait Observe: Send + Sync + 'static {
-    /// Platforms with observations that a question is about, by dataset and name.
-    async fn platforms(&self, filter: &Filter) -> Result<Vec<Platform>, BackendError>;
+    /// Platforms with observations that a question is about, by dataset and name, and whether these are all.
+    async fn platforms(&self, filter: &Filter) -> Result<PlatformList, BackendError>;
+
+    /// All data sets that there are observations of, by name.
+    async fn datasets(&self) -> Result<Vec<ProductId>, BackendError>;
 
     /// Where a platform was, in the order of time.
     async fn track(&self, query: &TrackQuery) -> Result<Vec<TrackPoint>, BackendError>;

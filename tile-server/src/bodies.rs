@@ -1,7 +1,6 @@
 //! Geometries that are sent along with a question: a request's body in, its text out, within a limit of bytes for all of them.
 
-use std::collections::HashMap;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 
 use axum::body::Body;
 use axum::http::{HeaderMap, header};
@@ -12,6 +11,7 @@ use tokio::sync::Semaphore;
 
 use crate::client::Client;
 use crate::error::ServerError;
+use crate::rooms::{Room, Rooms};
 
 /// Bytes of one body.
 pub(crate) const BODY_BYTES: u64 = MAX_TEXT_BYTES as u64;
@@ -23,57 +23,9 @@ const GEOJSON: [&str; 2] = ["application/geo+json", "application/json"];
 /// Bounds what bodies take. Clones are the same bounds.
 #[derive(Debug, Clone)]
 pub(crate) struct Bodies {
-    held: Arc<Held>,
+    held: Rooms,
     /// Reading takes several times the size of a text: one is read at a time.
     reading: Arc<Semaphore>,
-}
-
-#[derive(Debug)]
-struct Held {
-    /// Bytes by client.
-    clients: Mutex<HashMap<Client, u64>>,
-    /// Those of all clients, for who watches.
-    bytes: IntGauge,
-}
-
-impl Held {
-    fn clients(&self) -> MutexGuard<'_, HashMap<Client, u64>> {
-        self.clients.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    fn give_back(&self, client: Client, bytes: u64) {
-        let mut clients = self.clients();
-        if let Some(own) = clients.get_mut(&client) {
-            *own -= bytes;
-            if *own == 0 {
-                clients.remove(&client);
-            }
-        }
-        self.bytes.set(clients.values().sum::<u64>() as i64);
-    }
-}
-
-/// Room for a body and for what is made of it; free again when this is dropped.
-#[derive(Debug)]
-pub(crate) struct Room {
-    held: Arc<Held>,
-    client: Client,
-    bytes: u64,
-}
-
-impl Room {
-    /// Gives back what is not needed.
-    fn shrink_to(&mut self, bytes: u64) {
-        let spare = self.bytes.saturating_sub(bytes);
-        self.bytes -= spare;
-        self.held.give_back(self.client, spare);
-    }
-}
-
-impl Drop for Room {
-    fn drop(&mut self) {
-        self.held.give_back(self.client, self.bytes);
-    }
 }
 
 /// A body that arrived whole.
@@ -88,10 +40,7 @@ impl Bodies {
     /// No bodies; `bytes` shows how many there are.
     pub(crate) fn new(bytes: IntGauge) -> Self {
         Self {
-            held: Arc::new(Held {
-                clients: Mutex::default(),
-                bytes,
-            }),
+            held: Rooms::new(HELD_BYTES, bytes),
             reading: Arc::new(Semaphore::new(1)),
         }
     }
@@ -107,7 +56,7 @@ impl Bodies {
         if limit > BODY_BYTES {
             return Err(too_large);
         }
-        let mut room = self.enter(Client::asking(), limit)?;
+        let mut room = self.room(limit)?;
         let mut bytes = Vec::with_capacity(limit as usize);
         let mut pieces = body.into_data_stream();
         while let Some(piece) = pieces.next().await {
@@ -139,23 +88,7 @@ impl Bodies {
 
     /// Room for what is made of an address of the client that asks.
     pub(crate) fn room(&self, bytes: u64) -> Result<Room, ServerError> {
-        self.enter(Client::asking(), bytes)
-    }
-
-    fn enter(&self, client: Client, bytes: u64) -> Result<Room, ServerError> {
-        let mut clients = self.held.clients();
-        let all: u64 = clients.values().sum();
-        let own = clients.get(&client).copied().unwrap_or_default();
-        if all + bytes > HELD_BYTES || own + bytes > HELD_BYTES / 2 {
-            return Err(ServerError::Busy);
-        }
-        clients.insert(client, own + bytes);
-        self.held.bytes.set((all + bytes) as i64);
-        Ok(Room {
-            held: Arc::clone(&self.held),
-            client,
-            bytes,
-        })
+        self.held.enter(Client::asking(), bytes)
     }
 }
 
@@ -206,34 +139,10 @@ pub(crate) fn announced(headers: &HeaderMap) -> Option<u64> {
 
 #[cfg(test)]
 mod tests {
-    use std::net::SocketAddr;
-
     use super::*;
 
     fn bodies() -> Bodies {
         Bodies::new(IntGauge::new("body_bytes", "Bytes of bodies.").unwrap())
-    }
-
-    fn client(number: u8) -> Client {
-        Client::at(SocketAddr::from(([192, 0, 2, number], 1)))
-    }
-
-    #[test]
-    fn one_client_has_half_of_the_room_and_all_together_have_no_more_than_there_is() {
-        let bodies = bodies();
-        let enter = |number| bodies.enter(client(number), BODY_BYTES);
-        let own = [enter(1).unwrap(), enter(1).unwrap()];
-        assert!(matches!(enter(1), Err(ServerError::Busy)));
-        let mut others = [enter(2).unwrap(), enter(3).unwrap()];
-        assert!(matches!(enter(4), Err(ServerError::Busy)));
-        assert_eq!(bodies.held.bytes.get(), HELD_BYTES as i64);
-        // What turns out smaller leaves room for others.
-        others[0].shrink_to(BODY_BYTES - 10);
-        assert!(bodies.enter(client(4), 11).is_err());
-        drop(bodies.enter(client(4), 10).unwrap());
-        drop((own, others));
-        assert_eq!(bodies.held.bytes.get(), 0);
-        assert!(bodies.held.clients().is_empty(), "clients are remembered");
     }
 
     #[tokio::test]
@@ -248,11 +157,11 @@ mod tests {
             let taken = bodies.take(&headers, Body::from(body)).await;
             assert_eq!(taken.is_ok(), is_taken, "{body:?}");
             if let Ok(sent) = taken {
-                assert_eq!(bodies.held.bytes.get(), body.len() as i64);
+                assert_eq!(bodies.held.held_bytes(), body.len() as u64);
                 let read = sent.read(|text| Ok(text.len())).await;
                 assert_eq!(read.unwrap().0, body.len());
             }
-            assert_eq!(bodies.held.bytes.get(), 0, "{body:?}");
+            assert_eq!(bodies.held.held_bytes(), 0, "{body:?}");
         }
         // A body that never ends is given up at the limit.
         let mebibyte = vec![b' '; 1 << 20];
@@ -261,7 +170,7 @@ mod tests {
         });
         let taken = bodies.take(&headers, Body::from_stream(endless)).await;
         assert!(matches!(taken, Err(ServerError::BodyTooLarge { .. })));
-        assert_eq!(bodies.held.bytes.get(), 0);
+        assert_eq!(bodies.held.held_bytes(), 0);
         headers.insert(header::CONTENT_ENCODING, "gzip".parse().unwrap());
         let taken = bodies.take(&headers, Body::from("{}")).await;
         assert!(matches!(taken, Err(ServerError::NoGeoJson)));

@@ -6,16 +6,22 @@ use std::sync::Arc;
 use bytes::Bytes;
 use contract::product::ProductId;
 use cube::{At, CubeError, Keys, Repository};
+use prometheus::IntGauge;
 use quick_cache::sync::Cache;
 use storage::Store;
 
+use crate::client::Client;
 use crate::error::ServerError;
 use crate::gate::Gate;
+use crate::rooms::{Room, Rooms};
 
 /// Versions that are held open: each is its metadata, and references of chunks that were asked for.
 const HELD_OPEN: usize = 32;
 /// Values that are read at the same time: a large one is 64 MiB.
 const READS_AT_ONCE: u32 = 16;
+/// Bytes of values that are read or on their way to clients: sixteen large ones, eight of one client. Who asks and takes nothing
+/// holds them until its connection ends.
+const HELD_BYTES: u64 = 1 << 30;
 /// Reads that may wait: xarray asks for many chunks at once.
 const READ_QUEUE: u32 = 1024;
 
@@ -24,15 +30,29 @@ pub(crate) struct Cubes {
     store: Store,
     open: Cache<String, Arc<Keys>>,
     pub(crate) reads: Gate,
+    held: Rooms,
+}
+
+/// A value and the room that it takes.
+struct Held {
+    content: Bytes,
+    _room: Room,
+}
+
+impl AsRef<[u8]> for Held {
+    fn as_ref(&self) -> &[u8] {
+        &self.content
+    }
 }
 
 impl Cubes {
-    /// None opened yet.
-    pub(crate) fn new(store: Store) -> Self {
+    /// None opened yet; `held_bytes` shows how much of their values is read or on its way.
+    pub(crate) fn new(store: Store, held_bytes: IntGauge) -> Self {
         Self {
             store,
             open: Cache::new(HELD_OPEN),
             reads: Gate::new(READS_AT_ONCE, READ_QUEUE),
+            held: Rooms::new(HELD_BYTES, held_bytes),
         }
     }
 
@@ -87,14 +107,29 @@ impl Cubes {
         })
     }
 
-    /// The value of a key of a version that is open, or a part of it; none if there is no such key.
+    /// The value of a key of a version that is open, or a part of it; none if there is no such key. `bytes` is its length, or that of
+    /// the part.
+    ///
+    /// # Errors
+    /// `Busy` if more would be held than may be.
     pub(crate) async fn get(
         &self,
         keys: &Keys,
         key: &str,
         range: Option<Range<u64>>,
+        bytes: u64,
     ) -> Result<Option<Bytes>, ServerError> {
-        self.answered(keys, keys.get(key, range).await)
+        // One that is larger than a client's share is given out alone, and not refused for ever.
+        let bytes = bytes.min(self.held.client_limit_bytes());
+        let room = self.held.enter(Client::asking(), bytes)?;
+        let content = self.answered(keys, keys.get(key, range).await)?;
+        // The room goes with the bytes, not with the body: that one ends when they lie in the connection's queue.
+        Ok(content.map(|content| {
+            Bytes::from_owner(Held {
+                content,
+                _room: room,
+            })
+        }))
     }
 
     /// Its length.

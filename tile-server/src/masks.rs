@@ -5,8 +5,8 @@ use contract::manifest::AskedVersion;
 use contract::region::{AskedRegion, MaskCode};
 
 use crate::analyses::region_bytes;
-use crate::bodies::Room;
 use crate::error::ServerError;
+use crate::rooms::Room;
 use crate::state::AppState;
 
 /// The mask, perhaps in one of its versions, and the code of a text; none if it is no such region.

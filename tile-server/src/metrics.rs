@@ -75,6 +75,8 @@ pub struct Metrics {
     pub analyses_waiting: IntGauge,
     /// Bytes of geometries whose questions are under way.
     pub(crate) body_bytes: IntGauge,
+    /// Bytes of values of Zarr that are read or on their way.
+    pub(crate) zarr_bytes: IntGauge,
     /// Pictures that were drawn and not stored, by why not.
     pub not_stored: IntCounterVec,
     /// Failed reads of the store.
@@ -169,6 +171,10 @@ impl Metrics {
             body_bytes: gauge(
                 "body_bytes",
                 "Bytes of geometries that were sent along, and whose questions are under way.",
+            )?,
+            zarr_bytes: gauge(
+                "zarr_bytes",
+                "Bytes of values of Zarr that are read or on their way to clients.",
             )?,
             not_stored: counters(
                 "not_stored_total",

@@ -96,7 +96,7 @@ impl AppState {
         let observing = Gate::new(settings.analyses_at_once, settings.analysis_queue);
         Ok(Self(Arc::new(Parts {
             catalogue: Catalogue::new(store.clone(), max_age, metrics.clone()),
-            cubes: Cubes::new(store.clone()),
+            cubes: Cubes::new(store.clone(), metrics.zarr_bytes.clone()),
             pictures: Pictures::new(store, Arc::clone(&drawer), draws, &limits, metrics.clone()),
             addresses: Addresses::default(),
             analyses: Analyses::new(analyst, analyses, metrics.clone()),

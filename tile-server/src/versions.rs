@@ -8,28 +8,29 @@ use quick_cache::sync::Cache;
 use storage::{StorageError, Store, manifests};
 
 use crate::catalogue::{Accumulated, Layer};
+use crate::derivations::Derivations;
 use crate::error::ServerError;
 
 /// Versions remembered: each is the list of its steps, some ten KiB.
 const REMEMBERED: usize = 256;
-/// Derivations looked through for the one of a version, newest first.
-const DERIVATIONS: usize = 64;
 
 /// The versions of all products.
 #[derive(Debug)]
 pub(crate) struct Versions {
-    store: Store,
     known: Cache<String, Arc<Layer>>,
     manifests: Cache<String, Arc<Manifest>>,
+    derivations: Derivations,
+    store: Store,
 }
 
 impl Versions {
     /// None read yet.
     pub(crate) fn new(store: Store) -> Self {
         Self {
-            store,
             known: Cache::new(REMEMBERED),
             manifests: Cache::new(REMEMBERED),
+            derivations: Derivations::new(store.clone()),
+            store,
         }
     }
 
@@ -91,22 +92,14 @@ impl Versions {
         &self,
         manifest: &Manifest,
         id: &ManifestId,
-    ) -> Result<Option<Accumulated>, StorageError> {
+    ) -> Result<Option<Accumulated>, ServerError> {
         if manifest.quantity != Quantity::CarbonFlux {
             return Ok(None);
         }
         let Ok(product) = manifest.product.accumulated() else {
             return Ok(None);
         };
-        let numbers = manifests::numbers(&self.store, &product).await?;
-        for number in numbers.into_iter().rev().take(DERIVATIONS) {
-            let Some(derived) = manifests::numbered(&self.store, &product, number).await? else {
-                continue;
-            };
-            if derived.derived_from.as_ref() == Some(id) {
-                return Ok(Some(Accumulated::new(derived.id(), Arc::new(derived))));
-            }
-        }
-        Ok(None)
+        let derived = self.derivations.of(id, &product).await?;
+        Ok(derived.map(|derived| Accumulated::new(derived.id(), derived)))
     }
 }

@@ -2,7 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use contract::budget::{BudgetHistory, BudgetQuery, VersionBudget};
+use contract::ContractError;
+use contract::budget::{BudgetHistory, BudgetQuery, StatedRiver, VersionBudget};
 use contract::grid::Grid;
 use contract::key::ObjectKey;
 use contract::manifest::Manifest;
@@ -22,7 +23,7 @@ const MOST_SUMMED: usize = 200;
 
 const NOTES: [&str; 2] = [
     "a version is dated by when it was written to this store; one that was copied here, by the copy",
-    "a mask of land, errors and a river flux of a product are those of its newest version in all rows",
+    "a mask of land and errors of a product are those of its newest version in all rows",
 ];
 
 /// What of a version a question reads.
@@ -93,21 +94,40 @@ impl Reads {
     }
 }
 
+/// # Errors
+/// A line of a history has no place for what is asked.
+fn check_one_number(query: &BudgetQuery) -> Result<(), ContractError> {
+    if query.step != TimeStep::Total || query.parts.is_some() {
+        let reason = "a history is of one number: ask for the total of one region";
+        return Err(ContractError::invalid("step", query.step.as_str(), reason));
+    }
+    if let Some(river) = &query.river {
+        let reason = "a history takes no rivers off: leave it out, and ask for the budget of a version, or as of a day, for what is left without them";
+        let stated = match &river.stated {
+            StatedRiver::Rate { tg_per_year, .. } => tg_per_year.to_string(),
+            StatedRiver::Product(product) => product.to_string(),
+        };
+        return Err(ContractError::invalid("river flux", &stated, reason));
+    }
+    let draws = query.errors.as_ref().and_then(|own| own.monte_carlo);
+    if let Some(own) = draws {
+        let reason = "a history draws no errors, its standard errors are sums over pairs: leave it out, and ask for the budget of a version, or as of a day, to have it checked by draws";
+        let draws = own.draws.to_string();
+        return Err(ContractError::invalid("Monte Carlo", &draws, reason));
+    }
+    Ok(())
+}
+
 /// The budget of a question by the versions of its product, oldest first.
 ///
 /// # Errors
-/// `UnknownProduct`; `Contract` for a question of several rows or more versions than are summed at once.
+/// `UnknownProduct`; `Contract` for a question of several rows, of rivers or draws, or more versions than are summed at once.
 pub fn history<'a>(
     engine: &'a Engine,
     query: &'a BudgetQuery,
 ) -> BoxFuture<'a, Result<BudgetHistory, ComputeError>> {
     Box::pin(async move {
-        if query.step != TimeStep::Total || query.parts.is_some() {
-            let reason = "a history is of one number: ask for the total of one region";
-            return Err(
-                contract::ContractError::invalid("step", query.step.as_str(), reason).into(),
-            );
-        }
+        check_one_number(query)?;
         let published = manifests::published(engine.store(), &query.product).await?;
         if published.is_empty() {
             return Err(ComputeError::UnknownProduct {
@@ -137,7 +157,7 @@ pub fn history<'a>(
                     "more than {MOST_SUMMED} versions changed it; ask for a period in the past (from, to), which fewer changed"
                 );
                 let name = query.product.as_str();
-                return Err(contract::ContractError::invalid("history", name, reason).into());
+                return Err(ContractError::invalid("history", name, reason).into());
             }
             let change = reads.change_from(before.as_ref());
             let last = versions

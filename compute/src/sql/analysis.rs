@@ -85,7 +85,7 @@ fn asked(product: &Named, place: &str, more: &[&str]) -> Asked {
         Place::Line(line) => of.line = Some(line),
         Place::Region(region) => of.region = Some(region),
     }
-    let of = of.query(product.product.clone());
+    let of = of.query(product.product.clone())?;
     let none = || ContractError::invalid("place", place, "give a region, a place or a line");
     Ok(Arc::new(Analysis {
         of: of.ok_or_else(none)?,

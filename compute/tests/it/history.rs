@@ -2,7 +2,7 @@
 
 use compute::budget::history;
 use compute::{Engine, ErrorClass};
-use contract::budget::{BudgetQuery, ErrorWords};
+use contract::budget::{AskedRiver, BudgetQuery, ErrorWords};
 use contract::grid::Grid;
 use contract::quantity::Quantity;
 use contract::time::{Period, TimeStep};
@@ -142,6 +142,26 @@ async fn what_has_no_history_is_refused() {
     let refused = history(&engine, &months).await.unwrap_err();
     assert_eq!(refused.class(), ErrorClass::BadRequest);
     assert!(refused.to_string().contains("one number"), "{refused}");
+    let flux = product("flux");
+    let rivers = BudgetQuery {
+        river: AskedRiver::asked(Some("650"), Some("somebody")).unwrap(),
+        ..total(&flux, "global")
+    };
+    let words = ErrorWords {
+        error: Some("10%"),
+        correlation_length_km: Some(1000.0),
+        monte_carlo: Some(20),
+        ..ErrorWords::default()
+    };
+    let draws = BudgetQuery {
+        errors: words.asked().unwrap(),
+        ..total(&flux, "global")
+    };
+    for (query, said) in [(rivers, "takes no rivers off"), (draws, "draws no errors")] {
+        let refused = history(&engine, &query).await.unwrap_err();
+        assert_eq!(refused.class(), ErrorClass::BadRequest);
+        assert!(refused.to_string().contains(said), "{refused}");
+    }
     let unknown = history(&engine, &total(&product("none"), "global"))
         .await
         .unwrap_err();

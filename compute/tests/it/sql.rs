@@ -688,7 +688,7 @@ pub(crate) async fn analysed(store: &Store) -> (Engine, SeriesAnalysis) {
         region: Some("162,-10,170,10".parse().unwrap()),
         ..SeriesWishes::default()
     };
-    let of = of.query(product("sst")).unwrap();
+    let of = of.query(product("sst")).unwrap().unwrap();
     let options = AnalysisOptions::new(AnalysisPart::ALL.to_vec()).unwrap();
     let answer = analyse(&engine, (&manifest, &id), &of, &options).await;
     (engine, answer.unwrap())

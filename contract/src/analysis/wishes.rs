@@ -38,9 +38,28 @@ pub struct SeriesWishes {
 
 impl SeriesWishes {
     /// The series of a product; none unless one of a place, a region and a line is given.
-    pub fn query(self, product: ProductId) -> Option<SeriesQuery> {
+    ///
+    /// # Errors
+    /// A figure of the earth of a cell, whose value has no area, or a mask of the sea of anything but a region.
+    pub fn query(self, product: ProductId) -> Result<Option<SeriesQuery>, ContractError> {
         let (from, to) = (self.from, self.to);
-        match (self.place, self.region, self.line) {
+        if let Some(earth) = self.earth
+            && self.place.is_some()
+        {
+            let reason = "areas and lengths are of regions and lines, and a cell is taken as it is: leave it out";
+            return Err(ContractError::invalid("earth", &earth.to_string(), reason));
+        }
+        if let (Some(ocean), None) = (&self.ocean, &self.region)
+            && (self.place.is_some() || self.line.is_some())
+        {
+            let reason = "how much of a cell is sea counts in regions alone: leave it out";
+            return Err(ContractError::invalid(
+                "ocean",
+                ocean.product.as_str(),
+                reason,
+            ));
+        }
+        Ok(match (self.place, self.region, self.line) {
             (Some(place), None, None) => Some(SeriesQuery::Cell {
                 product,
                 place,
@@ -61,7 +80,7 @@ impl SeriesWishes {
                 ..LineSeriesQuery::new(product, line)
             })),
             _ => None,
-        }
+        })
     }
 }
 
@@ -84,8 +103,9 @@ impl AnalysisWishes {
     /// It with what is usual in place of what is absent.
     ///
     /// # Errors
-    /// No part at all.
+    /// No part at all, or an option of parts that are not asked for.
     pub fn options(self) -> Result<AnalysisOptions, ContractError> {
+        self.check_options()?;
         Ok(AnalysisOptions {
             base: self.base,
             bins: self.bins.unwrap_or_default(),
@@ -93,6 +113,28 @@ impl AnalysisWishes {
             min_coverage: self.min_coverage.unwrap_or_default(),
             ..AnalysisOptions::new(self.parts)?
         })
+    }
+
+    /// # Errors
+    /// An option that changes nothing of what is asked for.
+    fn check_options(&self) -> Result<(), ContractError> {
+        let is_asked = |part| self.parts.contains(&part);
+        if !is_asked(AnalysisPart::Climatology) && !is_asked(AnalysisPart::Anomaly) {
+            let reason = "it belongs to the climatology and the anomaly: ask for one of them, or leave it out";
+            if let Some(base) = self.base {
+                return Err(ContractError::invalid("base", &base.to_string(), reason));
+            }
+            if let Some(bins) = self.bins {
+                return Err(ContractError::invalid("bins", bins.as_str(), reason));
+            }
+        }
+        match self.trend_step {
+            Some(step) if !is_asked(AnalysisPart::Trend) => {
+                let reason = "it belongs to the trend: ask for that, or leave it out";
+                Err(ContractError::invalid("trend step", step.as_str(), reason))
+            }
+            _ => Ok(()),
+        }
     }
 }
 
@@ -191,7 +233,7 @@ mod tests {
             region: Some("global".parse().unwrap()),
             ..SeriesWishes::default()
         };
-        wishes.query("sst".parse().unwrap()).unwrap()
+        wishes.query("sst".parse().unwrap()).unwrap().unwrap()
     }
 
     #[test]
@@ -201,11 +243,11 @@ mod tests {
                 place: has_place.then(|| LonLatDeg::new(1.0, 2.0).unwrap()),
                 region: has_region.then(|| "global".parse().unwrap()),
                 line: has_line.then(|| "0,0;1,1".parse().unwrap()),
-                earth: Some(Earth::Sphere),
+                earth: (!has_place).then_some(Earth::Sphere),
                 to: "2001".parse().ok(),
                 ..SeriesWishes::default()
             };
-            wishes.query("sst".parse().unwrap())
+            wishes.query("sst".parse().unwrap()).unwrap()
         };
         assert!(matches!(
             of(true, false, false),
@@ -271,9 +313,47 @@ mod tests {
     }
 
     #[test]
+    fn what_would_change_nothing_is_refused() {
+        let asked = |parts: &[AnalysisPart], change: fn(&mut AnalysisWishes)| {
+            let mut wishes = AnalysisWishes {
+                parts: parts.to_vec(),
+                ..AnalysisWishes::default()
+            };
+            change(&mut wishes);
+            wishes.options().map_err(|refused| refused.to_string())
+        };
+        let base: fn(&mut AnalysisWishes) = |wishes| wishes.base = "1991/2020".parse().ok();
+        let bins: fn(&mut AnalysisWishes) = |wishes| wishes.bins = Some(CalendarBins::Month);
+        let step: fn(&mut AnalysisWishes) = |wishes| wishes.trend_step = Some(TimeStep::Month);
+        let all = AnalysisPart::ALL;
+        for (change, said) in [
+            (base, "the climatology and the anomaly"),
+            (bins, "the climatology and the anomaly"),
+            (step, "the trend"),
+        ] {
+            assert!(asked(&all, change).is_ok(), "{said}");
+            let of_others = [AnalysisPart::Season, AnalysisPart::Extremes];
+            for parts in [&of_others[..], &[]] {
+                let refused = asked(parts, change).unwrap_err();
+                assert!(refused.contains(said), "{refused}");
+            }
+        }
+        assert!(asked(&[AnalysisPart::Trend], base).is_err());
+        assert!(asked(&[AnalysisPart::Climatology], step).is_err());
+        assert!(asked(&[AnalysisPart::Anomaly], bins).is_ok());
+        let cell = SeriesWishes {
+            place: Some(LonLatDeg::new(1.0, 2.0).unwrap()),
+            earth: Some(Earth::Wgs84),
+            ..SeriesWishes::default()
+        };
+        let refused = cell.query("sst".parse().unwrap()).unwrap_err();
+        assert!(refused.to_string().contains("a cell"), "{refused}");
+    }
+
+    #[test]
     fn what_is_asked_is_in_the_question() {
         let asked = AnalysisWishes {
-            parts: vec![AnalysisPart::Trend],
+            parts: vec![AnalysisPart::Trend, AnalysisPart::Anomaly],
             base: "1991/2000".parse().ok(),
             bins: Some(CalendarBins::Season),
             trend_step: Some(TimeStep::Year),
@@ -316,7 +396,8 @@ mod tests {
             ..SeriesWishes::default()
         };
         let window = (taken.from, taken.to);
-        let Some(SeriesQuery::Region(query)) = taken.query("sst".parse().unwrap()) else {
+        let taken = taken.query("sst".parse().unwrap());
+        let Ok(Some(SeriesQuery::Region(query))) = taken else {
             panic!("no region");
         };
         assert_eq!(

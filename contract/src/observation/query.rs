@@ -95,6 +95,15 @@ pub struct Platform {
     pub count: u64,
 }
 
+/// Platforms by dataset and name.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PlatformList {
+    /// The first ones, no more than the limit.
+    pub platforms: Vec<Platform>,
+    /// Are these all that the question is about?
+    pub is_complete: bool,
+}
+
 /// Whose way is wanted, and when.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrackQuery {
@@ -106,7 +115,8 @@ pub struct TrackQuery {
     pub from: Option<TimeMs>,
     /// First instant that is too late.
     pub to: Option<TimeMs>,
-    /// Most places, 1 to [`MAX_PLACES`]; the first ones are given.
+    /// Most places, 1 to [`MAX_PLACES`]. Of a way with more every n-th is given, and its first and last place always; of a
+    /// limit of one the last.
     pub limit: u32,
 }
 

@@ -55,6 +55,9 @@ pub(crate) struct Analysis {
 
 impl Analysis {
     /// What is asked for; none if the series itself is.
+    ///
+    /// # Errors
+    /// An option of what is not asked for.
     pub(crate) fn asked(
         &self,
         min_coverage: Option<MinCoverage>,
@@ -70,14 +73,9 @@ impl Analysis {
             .into_iter()
             .filter_map(|(is_asked, part)| is_asked.then_some(part))
             .collect();
-        if parts.is_empty() {
-            return match self.base {
-                Some(base) => {
-                    let reason = "it belongs to --climatology and --anomaly";
-                    Err(ContractError::invalid("--base", &base.to_string(), reason))
-                }
-                None => Ok(None),
-            };
+        let has_option = self.base.is_some() || self.bins.is_some() || self.trend_step.is_some();
+        if parts.is_empty() && !has_option {
+            return Ok(None);
         }
         let wishes = AnalysisWishes {
             parts,
@@ -133,9 +131,10 @@ pub(crate) struct StatsCorrelate {
     /// First instant after the period. The products' own if absent.
     #[arg(long)]
     pub(crate) to: Option<TimeMs>,
-    /// Figure of the earth for areas and lengths: wgs84, sphere (R = 6371 km) or local-radius (as FluxEngine sums).
-    #[arg(long, default_value = "wgs84")]
-    pub(crate) earth: Earth,
+    /// Figure of the earth for areas and lengths, of a region or a line: wgs84, sphere (R = 6371 km) or local-radius (as FluxEngine sums).
+    /// wgs84 if absent.
+    #[arg(long, value_name = "EARTH")]
+    pub(crate) earth: Option<Earth>,
     /// JSON instead of a table.
     #[arg(long)]
     pub(crate) json: bool,
@@ -168,9 +167,10 @@ pub(crate) struct StatsDifference {
     /// said. 0 if absent.
     #[arg(long, value_name = "PERCENT")]
     pub(crate) min_coverage: Option<MinCoverage>,
-    /// Figure of the earth for areas and lengths: wgs84, sphere (R = 6371 km) or local-radius (as FluxEngine sums).
-    #[arg(long, default_value = "wgs84")]
-    pub(crate) earth: Earth,
+    /// Figure of the earth for areas and lengths, of a region or a line: wgs84, sphere (R = 6371 km) or local-radius (as FluxEngine sums).
+    /// wgs84 if absent.
+    #[arg(long, value_name = "EARTH")]
+    pub(crate) earth: Option<Earth>,
     /// JSON instead of a table.
     #[arg(long)]
     pub(crate) json: bool,
@@ -248,7 +248,43 @@ impl FromStr for PlotFile {
 
 #[cfg(test)]
 mod tests {
+    use clap::Parser;
+
     use super::*;
+
+    #[derive(Parser)]
+    struct Line {
+        #[command(flatten)]
+        analysis: Analysis,
+    }
+
+    #[test]
+    fn options_of_what_is_not_asked_for_are_refused() {
+        let asked = |words: &str| {
+            let words = ["stats"].into_iter().chain(words.split_whitespace());
+            Line::parse_from(words).analysis.asked(None)
+        };
+        assert_eq!(asked("").unwrap(), None);
+        for right in [
+            "--trend --trend-step year",
+            "--anomaly --bins season --base 1991/2020",
+        ] {
+            assert!(asked(right).unwrap().is_some(), "{right}");
+        }
+        for (words, said) in [
+            ("--base 1991/2020", "the climatology and the anomaly"),
+            ("--bins season", "the climatology and the anomaly"),
+            (
+                "--trend --base 1991/2020",
+                "the climatology and the anomaly",
+            ),
+            ("--trend-step year", "the trend"),
+            ("--climatology --trend-step year", "the trend"),
+        ] {
+            let refused = asked(words).unwrap_err().to_string();
+            assert!(refused.contains(said), "{words}: {refused}");
+        }
+    }
 
     #[test]
     fn plots_are_told_by_the_ending_of_their_file() {

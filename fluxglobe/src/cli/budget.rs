@@ -49,7 +49,8 @@ pub(crate) struct Budget {
     /// PRODUCT@NUMBER-DIGEST, where --product names none. The newest of all if absent.
     #[arg(long, value_name = "DATE|VERSION")]
     pub(crate) as_of: Option<AsOf>,
-    /// One line for each version of the product that changed the budget, with its date and what it changed.
+    /// One line for each version of the product that changed the budget, with its date and what it changed; of the total, without
+    /// --river-flux and --monte-carlo.
     #[arg(long, conflicts_with_all = ["as_of", "regions"])]
     pub(crate) history: bool,
     /// Standard error of the flux: 20% of it (with its sign: sources and sinks grow together), a number with its unit such as

@@ -42,7 +42,7 @@ pub(crate) struct ObservationsAsked {
     /// buoy, ship, station or profile.
     #[arg(long)]
     pub(crate) kind: Option<PlatformKind>,
-    /// Most observations, 1 to 1,000,000.
+    /// Most observations, 1 to 1,000,000; of platforms (`list`) the first 10,000 at most.
     #[arg(long, default_value_t = 1000, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub(crate) limit: u32,
     /// JSON instead of a table, a line each.

@@ -15,7 +15,7 @@ use storage::{Store, fields};
 use tokio::sync::mpsc;
 
 use crate::cli::{Export, ExportFormat, Settings};
-use crate::{deployment, progress};
+use crate::{deployment, instants, progress};
 
 /// What was written.
 #[derive(Serialize)]
@@ -153,7 +153,7 @@ async fn send(source: Source<'_>, sender: mpsc::Sender<Arriving>) -> Result<()> 
     let (store, manifest) = (source.store, source.manifest);
     let cube = own_cube(store, manifest).await;
     for (place, step) in manifest.steps.iter().enumerate() {
-        source.bar.set_message(progress::day(step.period.start));
+        source.bar.set_message(instants::shown(step.period.start));
         if let Some(cube) = cube.as_ref().filter(|_| !source.is_large()) {
             let values = Arriving::Band(cube.field(place).await?);
             if sender.send(values).await.is_err() {
@@ -188,7 +188,7 @@ async fn arrays(
         let mut zarr = PlainZarr::create(destination, "", &description).await?;
         let cube = own_cube(store, manifest).await;
         for (place, step) in manifest.steps.iter().enumerate() {
-            bar.set_message(progress::day(step.period.start));
+            bar.set_message(instants::shown(step.period.start));
             match cube.as_ref().filter(|_| !source.is_large()) {
                 Some(cube) => {
                     let values = cube.field(place).await?;

@@ -13,7 +13,7 @@ use serde::Serialize;
 use storage::{Store, manifests};
 
 use crate::cli::{Migrate, Settings};
-use crate::progress::day;
+use crate::instants::shown;
 use crate::{deployment, progress};
 
 /// What became of a product.
@@ -101,9 +101,9 @@ fn tell(bar: &ProgressBar, product: &ProductId, stage: Stage) {
             bar.inc(1);
             bar.set_message(format!("{product}@{number}"));
         }
-        Stage::Put(period) => bar.set_message(format!("{product}: put {}", day(period.start))),
+        Stage::Put(period) => bar.set_message(format!("{product}: put {}", shown(period.start))),
         Stage::Compared(period) => {
-            bar.set_message(format!("{product}: compared {}", day(period.start)));
+            bar.set_message(format!("{product}: compared {}", shown(period.start)));
         }
         Stage::Compacting => bar.set_message(format!("{product}: runs along time")),
         Stage::Verifying => bar.set_message(format!("{product}: objects and runs")),

@@ -1,7 +1,5 @@
 //! `fluxglobe observations`: which platforms there are, what they measured, and how a product compares with it.
 
-use std::collections::BTreeSet;
-
 use anyhow::{Result, bail};
 use comfy_table::presets::NOTHING;
 use comfy_table::{CellAlignment, Table};
@@ -12,6 +10,7 @@ use observations::ObservationStore;
 
 use crate::cli::{MatchTime, Matchup, Observations, ObservationsAsked, Settings};
 use crate::command::budget;
+use crate::instants::Instants;
 use crate::{deployment, plot, progress};
 
 pub(crate) async fn run(settings: &Settings, command: Observations) -> Result<()> {
@@ -39,12 +38,19 @@ fn filter(asked: &ObservationsAsked) -> Result<Filter> {
 async fn list(settings: &Settings, asked: &ObservationsAsked) -> Result<()> {
     let objects = deployment::store(settings)?;
     let store = observations::open(&asked.store, &objects)?;
-    let platforms = store.platforms(&filter(asked)?).await?;
+    let filter = filter(asked)?;
+    let found = store.platforms(&filter).await?;
+    let platforms = found.platforms;
     if platforms.is_empty() {
         check_dataset(store.as_ref(), asked).await?;
     }
     let warnings = masked(&objects, asked).await?;
-    let warn = || warnings.iter().for_each(|line| progress::say(line));
+    let warn = || {
+        if !found.is_complete {
+            progress::say(&cut_list(filter.limit));
+        }
+        warnings.iter().for_each(|line| progress::say(line));
+    };
     if asked.json {
         for platform in &platforms {
             progress::result(&serde_json::to_string(platform)?)?;
@@ -68,13 +74,14 @@ async fn list(settings: &Settings, asked: &ObservationsAsked) -> Result<()> {
         "values",
         "properties",
     ]);
+    let instants = Instants::of(platforms.iter().flat_map(|p| [p.first, p.last]));
     for p in platforms {
         table.add_row([
             p.dataset.to_string(),
             p.platform,
             p.kind.to_string(),
-            progress::day(p.first),
-            progress::day(p.last),
+            instants.text(p.first),
+            instants.text(p.last),
             format!("{:.3}, {:.3}", p.lon_deg, p.lat_deg),
             p.count.to_string(),
             p.properties.join(" "),
@@ -91,29 +98,16 @@ async fn check_dataset(store: &dyn ObservationStore, asked: &ObservationsAsked) 
     let Some(dataset) = &asked.dataset else {
         return Ok(());
     };
-    let of = |datasets| Filter {
-        datasets,
-        limit: MAX_LIMIT,
-        ..Filter::default()
-    };
-    if !store
-        .platforms(&of(vec![dataset.clone()]))
-        .await?
-        .is_empty()
-    {
+    let known = store.datasets().await?;
+    if known.contains(dataset) {
         return Ok(());
     }
-    let platforms = store.platforms(&of(vec![])).await?;
-    let known: BTreeSet<String> = platforms
-        .iter()
-        .map(|own| own.dataset.to_string())
-        .collect();
     if known.is_empty() {
         bail!(
             "there is no dataset {dataset}, nor any other; land files of observations with `fluxglobe ingest`"
         );
     }
-    let known: Vec<String> = known.into_iter().collect();
+    let known: Vec<String> = known.iter().map(ToString::to_string).collect();
     bail!(
         "there is no dataset {dataset}; there are {}",
         known.join(", ")
@@ -187,6 +181,16 @@ async fn query(settings: &Settings, asked: &ObservationsAsked) -> Result<()> {
 /// What is said where there are more observations than the limit.
 fn cut(limit: u32) -> String {
     format!("these are the first {limit}, and there are more: --limit takes up to 1000000")
+}
+
+/// What is said where there are more platforms than a list holds.
+fn cut_list(limit: u32) -> String {
+    let more = if limit < MAX_LIMIT {
+        format!("--limit takes up to {MAX_LIMIT}")
+    } else {
+        "ask for one --dataset, a --region or a period (--from, --to)".to_owned()
+    };
+    format!("these are the first {limit} platforms, and there are more: {more}")
 }
 
 /// Up to the limit, page by page; and whether these are all that there are.
@@ -294,6 +298,14 @@ mod tests {
     use compute::matchup::statistics::Statistics;
 
     use super::*;
+
+    #[test]
+    fn a_list_that_is_cut_says_how_to_see_the_rest() {
+        let text = cut_list(1000);
+        assert!(text.contains("the first 1000 platforms") && text.ends_with("up to 10000"));
+        let text = cut_list(MAX_LIMIT);
+        assert!(text.contains("the first 10000 platforms") && text.contains("--dataset"));
+    }
 
     #[test]
     fn a_comparison_is_a_row_with_units_and_what_is_left_out_is_told_in_words() {

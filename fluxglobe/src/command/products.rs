@@ -8,6 +8,7 @@ use contract::listing::ListedProduct;
 use contract::time::TimeMs;
 
 use crate::cli::{Products, Settings};
+use crate::instants::{self, Instants};
 use crate::{deployment, progress};
 
 /// Codes of a mask that are shown on a line.
@@ -22,7 +23,7 @@ fn warnings(row: &ListedProduct) -> Vec<String> {
             "{product}: {} in {} of {steps} steps; most in that of {}, {} ({:.2} %)",
             masked.cells(),
             masked.steps,
-            progress::day(most.start),
+            instants::shown(most.start),
             most.cells,
             100.0 * most.share
         ));
@@ -75,10 +76,12 @@ pub(crate) async fn run(settings: &Settings, options: &Products) -> Result<()> {
         "product", "title", "cells", "steps", "from", "to", "manifest",
     ]);
     let mut besides = vec![];
+    let ends = rows.iter().flat_map(|row| [row.start, row.end]);
+    let instants = Instants::of(ends.flatten());
     for row in rows {
         besides.extend(codes(&row));
         besides.extend(warnings(&row));
-        let day = |time: Option<TimeMs>| time.map_or(String::new(), progress::day);
+        let end = |time: Option<TimeMs>| time.map_or(String::new(), |time| instants.text(time));
         // Titles of made-up data mostly say so themselves.
         let says = row.title.to_lowercase().contains("synthetic");
         let synthetic = if row.synthetic && !says {
@@ -91,8 +94,8 @@ pub(crate) async fn run(settings: &Settings, options: &Products) -> Result<()> {
             format!("{synthetic}{}", row.title),
             format!("{} x {}", row.rows, row.cols),
             row.step_count.to_string(),
-            day(row.start),
-            day(row.end),
+            end(row.start),
+            end(row.end),
             row.manifest.to_string(),
         ]);
     }

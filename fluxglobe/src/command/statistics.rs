@@ -11,6 +11,7 @@ use export::answer::AnswerFormat;
 use storage::Store;
 
 use crate::cli::{PlotFile, Settings};
+use crate::instants::Instants;
 use crate::{deployment, plot, progress};
 
 /// How an answer is printed.
@@ -106,9 +107,13 @@ fn table(answer: &StatisticsAnswer) -> Table {
             column.set_cell_alignment(CellAlignment::Right);
         }
     }
-    for row in &answer.rows {
-        let mut cells = vec![progress::day(row.start), progress::day(row.end)];
-        cells.extend(answer.statistics.iter().map(|one| shown(row, &one.name)));
+    let rows = &answer.rows;
+    let instants = Instants::of(rows.iter().flat_map(|row| [row.start, row.end]));
+    let found = Instants::of(rows.iter().flat_map(|row| row.found_at.values().copied()));
+    for row in rows {
+        let mut cells = vec![instants.text(row.start), instants.text(row.end)];
+        let values = answer.statistics.iter();
+        cells.extend(values.map(|one| shown(row, &one.name, found)));
         cells.push(format!("{:.1}", row.coverage_percent));
         table.add_row(cells);
     }
@@ -116,7 +121,7 @@ fn table(answer: &StatisticsAnswer) -> Table {
 }
 
 /// A value with as many digits as people read, and where an extreme was found.
-fn shown(row: &StatisticsRow, name: &str) -> String {
+fn shown(row: &StatisticsRow, name: &str, found: Instants) -> String {
     let Some(value) = row.values.get(name).copied().flatten() else {
         let why = if row.is_withheld {
             "withheld"
@@ -133,7 +138,7 @@ fn shown(row: &StatisticsRow, name: &str) -> String {
         format!("{value:.4}")
     };
     match row.found_at.get(name) {
-        Some(time) => format!("{number} ({})", progress::day(*time)),
+        Some(time) => format!("{number} ({})", found.text(*time)),
         None => number,
     }
 }

@@ -13,6 +13,7 @@ use contract::series::{PointSeries, RegionSeries};
 use contract::statistics::{PointQuestion, RegionQuestion, StatisticsWishes};
 
 use crate::cli::{Settings, Stats, StatsLine, StatsPoint, StatsPolygon};
+use crate::instants::Instants;
 use crate::{deployment, plot, progress};
 
 use super::analysis::{self, Output};
@@ -218,11 +219,12 @@ fn region_table(answer: &RegionSeries) -> Table {
             column.set_cell_alignment(CellAlignment::Right);
         }
     }
+    let instants = Instants::of(answer.series.iter().flat_map(|step| [step.start, step.end]));
     for step in &answer.series {
         let mean = step.mean.map(|mean| format!("{mean:.4}"));
         table.add_row([
-            progress::day(step.start),
-            progress::day(step.end),
+            instants.text(step.start),
+            instants.text(step.end),
             mean.unwrap_or_else(|| "no data".to_owned()),
             format!("{:.1}", step.coverage_percent),
             format!("{:.3}", step.area_m2 / M2_PER_MILLION_KM2),
@@ -250,14 +252,15 @@ fn table(answer: &PointSeries) -> Table {
             column.set_cell_alignment(CellAlignment::Right);
         }
     }
+    let instants = Instants::of(answer.series.iter().flat_map(|step| [step.start, step.end]));
     for step in &answer.series {
         let (text, bar) = match step.value {
             Some(value) => (format!("{value:.4}"), bar(value, largest)),
             None => ("no data".to_owned(), String::new()),
         };
         let mut row = vec![
-            progress::day(step.start),
-            progress::day(step.end),
+            instants.text(step.start),
+            instants.text(step.end),
             text,
             bar,
         ];

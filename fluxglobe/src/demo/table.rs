@@ -9,7 +9,7 @@ use contract::check::{AgainstPaper, Check, Stated};
 use contract::manifest::Manifest;
 use contract::time::TimeStep;
 
-use crate::progress;
+use crate::instants;
 
 /// What the paper says, what an independent integration of its grid says, what we say.
 pub(crate) fn against_published(comparison: &Check) -> String {
@@ -80,8 +80,8 @@ pub(crate) async fn synthetic(engine: &Engine, flux: &Manifest) -> Result<String
         ];
         let [budget, coverage] = numbers;
         table.add_row([
-            progress::day(row.start),
-            progress::day(row.end),
+            instants::shown(row.start),
+            instants::shown(row.end),
             budget,
             coverage,
         ]);

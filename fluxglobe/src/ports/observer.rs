@@ -3,7 +3,8 @@
 use std::sync::Arc;
 
 use async_trait::async_trait;
-use contract::observation::{Filter, Page, Platform, TrackPoint, TrackQuery};
+use contract::observation::{Filter, Page, PlatformList, TrackPoint, TrackQuery};
+use contract::product::ProductId;
 use observations::{ErrorClass, ObservationError, ObservationStore};
 use tile_server::backend::{BackendError, Class, Observe};
 
@@ -12,8 +13,12 @@ pub(crate) struct Observer(pub(crate) Arc<dyn ObservationStore>);
 
 #[async_trait]
 impl Observe for Observer {
-    async fn platforms(&self, filter: &Filter) -> Result<Vec<Platform>, BackendError> {
+    async fn platforms(&self, filter: &Filter) -> Result<PlatformList, BackendError> {
         self.0.platforms(filter).await.map_err(failed)
+    }
+
+    async fn datasets(&self) -> Result<Vec<ProductId>, BackendError> {
+        self.0.datasets().await.map_err(failed)
     }
 
     async fn track(&self, query: &TrackQuery) -> Result<Vec<TrackPoint>, BackendError> {

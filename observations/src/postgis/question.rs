@@ -66,11 +66,12 @@ pub(super) fn observations<'a>(checked: &'a CheckedFilter<'_>) -> Question<'a> {
     question
 }
 
-/// Platforms of the wanted rows; the last row of a platform is that of its latest time, then first property, least depth.
+/// Platforms of the wanted rows, one more than the limit; the last row of a platform is that of its latest time, then first
+/// property, least depth.
 pub(super) fn platforms<'a>(checked: &'a CheckedFilter<'_>) -> Question<'a> {
     let mut question = Question::new();
     let wanted = conditions(&mut question, checked);
-    let limit = question.parameter(i64::from(checked.filter.limit));
+    let limit = question.parameter(i64::from(checked.filter.limit) + 1);
     question.sql = format!(
         "WITH wanted AS (SELECT dataset, platform, kind, obs_time, ST_X(place) AS lon, ST_Y(place) AS lat, property, depth_m \
              FROM observation {}), \
@@ -90,7 +91,19 @@ pub(super) fn platforms<'a>(checked: &'a CheckedFilter<'_>) -> Question<'a> {
     question
 }
 
-/// One place for each time of a platform.
+/// Datasets by name, each found by the index from the one before it.
+pub(super) fn datasets() -> Question<'static> {
+    let sql = "WITH RECURSIVE known AS (SELECT min(dataset) AS dataset FROM observation UNION ALL \
+             SELECT (SELECT min(dataset) FROM observation WHERE dataset > known.dataset) FROM known \
+             WHERE known.dataset IS NOT NULL) \
+         SELECT dataset FROM known WHERE dataset IS NOT NULL ORDER BY dataset";
+    Question {
+        sql: sql.to_owned(),
+        parameters: vec![],
+    }
+}
+
+/// One place for each time of a platform; of more than the limit those that `track::thinned` keeps.
 pub(super) fn track(query: &TrackQuery) -> Question<'_> {
     let mut question = Question::new();
     let mut wanted = vec![
@@ -109,10 +122,14 @@ pub(super) fn track(query: &TrackQuery) -> Question<'_> {
             question.parameter(system_time(to))
         ));
     }
-    let limit = question.parameter(i64::from(query.limit));
+    let gaps = question.parameter(i64::from(query.limit) - 1);
     question.sql = format!(
-        "SELECT DISTINCT ON (obs_time) obs_time, ST_X(place), ST_Y(place) FROM observation {} \
-         ORDER BY obs_time, property, depth_m LIMIT {limit}",
+        "WITH way AS (SELECT DISTINCT ON (obs_time) obs_time, ST_X(place) AS lon, ST_Y(place) AS lat FROM observation {} \
+             ORDER BY obs_time, property, depth_m), \
+         numbered AS (SELECT obs_time, lon, lat, row_number() OVER (ORDER BY obs_time) - 1 AS nth, count(*) OVER () - 1 AS final \
+             FROM way) \
+         SELECT obs_time, lon, lat FROM numbered WHERE nth = final OR {gaps}::bigint > 0 \
+             AND nth % greatest((final + {gaps}::bigint - 1) / greatest({gaps}::bigint, 1), 1) = 0 ORDER BY obs_time",
         all_of(&wanted)
     );
     question

@@ -3,6 +3,7 @@
 use std::time::SystemTime;
 
 use contract::observation::{Observation, Platform, PlatformKind, Quality, TrackPoint};
+use contract::product::ProductId;
 use contract::time::TimeMs;
 use tokio_postgres::Row;
 use tokio_postgres::types::FromSql;
@@ -43,6 +44,11 @@ pub(super) fn platform(row: &Row) -> Result<Platform, ObservationError> {
         properties: get(row, 13)?,
         count: get::<i64>(row, 14)?.cast_unsigned(),
     })
+}
+
+/// A row of [`super::question::datasets`].
+pub(super) fn dataset(row: &Row) -> Result<ProductId, ObservationError> {
+    parsed(row, 0)
 }
 
 /// A row of [`super::question::track`].

@@ -42,7 +42,9 @@ suite! {
     asking::edges_of_a_polygon_belong_to_it_and_those_of_its_hole_too,
     asking::a_filter_finds_what_it_names_and_nothing_else,
     asking::platforms_are_summed_up_over_what_is_wanted,
+    asking::every_dataset_is_named_however_many_platforms_others_have,
     asking::a_track_has_one_place_for_each_time,
+    asking::a_long_track_is_thinned_and_ends_where_it_ends,
     asking::questions_beyond_their_limits_are_refused,
     asking::an_empty_home_is_ready_and_answers_with_nothing,
 }

@@ -15,12 +15,12 @@ use serde::Deserialize;
 use utoipa::IntoParams;
 
 use crate::backend::{SeriesQuestion, Version};
-use crate::bodies::Room;
 use crate::catalogue::Layer;
 use crate::error::ServerError;
 use crate::extract::{UrlPath, UrlQuery, left_out, number, parsed, time};
 use crate::masks;
 use crate::openapi::words::GeoJson;
+use crate::rooms::Room;
 use crate::routes::budget::ocean;
 use crate::state::AppState;
 
@@ -31,11 +31,11 @@ pub(crate) struct AnalysisParameters {
     /// What is made of the series: `climatology`, `anomaly`, `trend`, `season`, `extremes`, several with commas.
     #[param(value_type = String)]
     parts: Option<String>,
-    /// Years of the climatology, both part of it: `1991/2020`; all that are covered unless given.
+    /// Years of the climatology and the anomaly, both part of it: `1991/2020`; all that are covered unless given. Of these parts alone.
     base: Option<String>,
-    /// Parts of the year of the climatology: `month` (the default), `season` or `day`.
+    /// Parts of the year of the climatology and the anomaly: `month` (the default), `season` or `day`. Of these parts alone.
     bins: Option<String>,
-    /// Means that the trend is drawn through; `month` unless told otherwise.
+    /// Means that the trend is drawn through; `month` unless told otherwise. Of the trend alone.
     #[param(value_type = Option<TimeStep>)]
     trend_step: Option<String>,
     /// Least coverage, percent: steps that hold data over less of the region's sea, or of the line, are left out, and the answer says
@@ -58,10 +58,10 @@ pub(crate) struct AnalysisParameters {
     from: Option<String>,
     /// First instant after the period; the product's own unless one is given.
     to: Option<String>,
-    /// Figure of the earth for areas and lengths; `wgs84` unless one is given.
+    /// Figure of the earth for areas and lengths, of a region or a line; `wgs84` unless one is given.
     #[param(value_type = Option<contract::earth::Earth>)]
     earth: Option<String>,
-    /// Landed product whose cells say how much of them is sea or land, in place of Natural Earth.
+    /// Landed product whose cells say how much of them is sea or land, in place of Natural Earth; of a region alone.
     ocean: Option<String>,
     /// Version, as answers name it, with or without its digest; the newest unless one is given.
     manifest: Option<String>,
@@ -253,7 +253,7 @@ impl SeriesText<'_> {
         // What cannot be asked waits for no turn.
         layer.manifest.steps_inside(wishes.from, wishes.to)?;
         let query = wishes
-            .query(layer.manifest.product.clone())
+            .query(layer.manifest.product.clone())?
             .ok_or(missing)?;
         if let SeriesQuery::Cell { place, .. } = &query {
             layer.manifest.cell_inside(*place)?;

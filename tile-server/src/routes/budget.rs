@@ -21,12 +21,12 @@ use serde::Deserialize;
 use utoipa::IntoParams;
 
 use super::statistics::{form, response};
-use crate::bodies::Room;
 use crate::catalogue::Layer;
 use crate::error::ServerError;
 use crate::extract::{UrlPath, UrlQuery, left_out, number, parsed, time, whole_number};
 use crate::masks;
 use crate::openapi::words::GeoJson;
+use crate::rooms::Room;
 use crate::state::AppState;
 
 #[derive(Debug, Deserialize, IntoParams)]
@@ -65,14 +65,14 @@ pub(crate) struct BudgetParameters {
     /// How long errors of steps go together, days: exp(-t / days). 0, the error of each step is its own, unless given.
     #[param(value_type = Option<f64>, minimum = 0)]
     correlation_days: Option<String>,
-    /// Draws of a Monte Carlo, 10 to 10000: a check, and an interval that holds 95 % of the budgets.
+    /// Draws of a Monte Carlo, 10 to 10000: a check, and an interval that holds 95 % of the budgets. Not of a history.
     #[param(value_type = Option<u32>, minimum = 10, maximum = 10000)]
     monte_carlo: Option<String>,
     /// The same seed draws the same errors; 0 unless given.
     #[param(value_type = Option<u64>)]
     seed: Option<String>,
     /// Outgassing of river carbon that is taken off, Tg of carbon a year out of the sea, with its standard error if there is one
-    /// (`650` or `650±300`), or a product that is summed over the same region.
+    /// (`650` or `650±300`), or a product that is summed over the same region. Not of a history.
     river_flux: Option<String>,
     /// Where the number is from; needed with it.
     river_source: Option<String>,

@@ -52,7 +52,7 @@ pub(crate) struct CorrelationParameters {
     from: Option<String>,
     /// First instant after the period; the products' own unless one is given.
     to: Option<String>,
-    /// Figure of the earth for areas and lengths; `wgs84` unless one is given.
+    /// Figure of the earth for areas and lengths, of a region or a line; `wgs84` unless one is given.
     #[param(value_type = Option<contract::earth::Earth>)]
     earth: Option<String>,
     /// Version, as answers name it, with or without its digest; the newest unless one is given.

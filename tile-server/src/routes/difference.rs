@@ -45,7 +45,7 @@ pub(crate) struct DifferenceParameters {
     /// `LON,LAT;LON,LAT;...` in degrees, GeoJSON or well-known text, in place of a region: the mean along a line, each cell by the length
     /// in it.
     line: Option<String>,
-    /// Figure of the earth for areas and lengths; `wgs84` unless one is given.
+    /// Figure of the earth for areas and lengths, of a region or a line; `wgs84` unless one is given.
     #[param(value_type = Option<contract::earth::Earth>)]
     earth: Option<String>,
 }

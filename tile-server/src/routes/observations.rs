@@ -1,7 +1,5 @@
 //! `/api/observations/{dataset}/{platform}`: what a buoy, ship, station or profile measured, a page at a time.
 
-use std::collections::BTreeSet;
-
 use axum::Json;
 use axum::extract::State;
 use axum::http::header;
@@ -91,22 +89,16 @@ pub(crate) async fn get(
 
 /// # Errors
 /// There are no observations of this data set; those that there are.
-async fn check_dataset(observer: &dyn Observe, dataset: &ProductId) -> Result<(), ServerError> {
-    let of = async |datasets| {
-        let filter = Filter {
-            datasets,
-            limit: MAX_LIMIT,
-            ..Filter::default()
-        };
-        let platforms = observer.platforms(&filter).await?;
-        let named = platforms.into_iter().map(|platform| platform.dataset);
-        Ok::<BTreeSet<ProductId>, ServerError>(named.collect())
-    };
-    if of(vec![dataset.clone()]).await?.contains(dataset) {
+pub(crate) async fn check_dataset(
+    observer: &dyn Observe,
+    dataset: &ProductId,
+) -> Result<(), ServerError> {
+    let known = observer.datasets().await?;
+    if known.contains(dataset) {
         return Ok(());
     }
     Err(ServerError::UnknownDataset {
         name: dataset.clone(),
-        known: of(vec![]).await?.into_iter().collect(),
+        known,
     })
 }

@@ -15,6 +15,7 @@ use utoipa::{IntoParams, ToSchema};
 use crate::backend::Observe;
 use crate::error::ServerError;
 use crate::extract::{UrlQuery, parsed, time};
+use crate::routes::observations::check_dataset;
 use crate::state::AppState;
 
 /// Platforms of one answer: as many points as a globe still shows apart.
@@ -52,8 +53,10 @@ struct Platforms {
     #[serde(rename = "type")]
     #[schema(inline)]
     kind: Collection,
-    /// By data set and name.
+    /// By data set and name, the first 10,000.
     features: Vec<PlatformFeature>,
+    /// Are these all that the question is about? Where they are not, ask for one data set, a region or a period.
+    is_complete: bool,
 }
 
 #[derive(Debug, Serialize, ToSchema)]
@@ -79,7 +82,8 @@ struct PlatformFeature {
     properties: Platform,
 }
 
-/// Places as longitude and latitude, degrees: the last one, or the track of a ship.
+/// Places as longitude and latitude, degrees: the last one, or the track of a ship, of at most 2,000 places from its first to its
+/// last, of the first 50 ships.
 #[derive(Debug, PartialEq, Serialize, ToSchema)]
 #[serde(tag = "type")]
 enum Geometry {
@@ -103,7 +107,7 @@ enum Geometry {
     responses(
         (status = 200, description = "Those with observations that the question is about", body = Platforms),
         (status = 304, description = "The copy that `If-None-Match` names is still right"),
-        (status = 404, description = "This server has no observations", body = crate::error::Refusal),
+        (status = 404, description = "This server has no observations, or none of this data set", body = crate::error::Refusal),
     ),
 )]
 pub(crate) async fn get(
@@ -119,7 +123,11 @@ pub(crate) async fn get(
         .inspect_err(|_busy| state.metrics.refused.inc())?;
     let mut features = vec![];
     let mut tracks = 0;
-    for platform in observer.platforms(&filter).await? {
+    let found = observer.platforms(&filter).await?;
+    if let (true, [dataset]) = (found.platforms.is_empty(), filter.datasets.as_slice()) {
+        check_dataset(observer.as_ref(), dataset).await?;
+    }
+    for platform in found.platforms {
         let track = if platform.kind == PlatformKind::Ship && tracks < MOST_TRACKS {
             tracks += 1;
             track(observer.as_ref(), &platform, &filter).await?
@@ -131,6 +139,7 @@ pub(crate) async fn get(
     let answer = Platforms {
         kind: Collection::FeatureCollection,
         features,
+        is_complete: found.is_complete,
     };
     Ok(([(header::CACHE_CONTROL, "no-cache")], Json(answer)).into_response())
 }

@@ -2,10 +2,9 @@
 
 use axum::Json;
 use axum::extract::State;
-use axum::http::{HeaderMap, StatusCode, header};
+use axum::http::header;
 use axum::response::{IntoResponse as _, Response};
 use contract::colour::TransferFunction;
-use contract::digest::Digest;
 use contract::job::{Mode, View};
 use contract::listing::ListedProduct;
 use contract::picture::{PictureOptions, PictureRequest};
@@ -19,7 +18,6 @@ use crate::error::ServerError;
 use crate::extract::{NoOthers, UrlQuery};
 use crate::openapi::words;
 use crate::request::Beside;
-use crate::routes::picture::has_tag;
 use crate::routes::{globe, tiles};
 use crate::state::AppState;
 use legend::Legend;
@@ -132,39 +130,18 @@ impl From<Period> for StepTimes {
 pub(crate) async fn list(
     State(state): State<AppState>,
     _no: UrlQuery<NoOthers>,
-    asked: HeaderMap,
 ) -> Result<Response, ServerError> {
     let layers = state.catalogue.layers().await?;
-    let pinned = |layer: &Layer| {
-        let modes = layer.modes().iter();
-        let pinned = modes.filter_map(|&mode| PinnedAddresses::of(layer, mode));
-        pinned.collect::<Vec<_>>()
-    };
-    let addresses: Vec<_> = layers.iter().map(|layer| pinned(layer)).collect();
-    // Versions of all that a product is drawn from are in its editions.
-    let names: Vec<_> = layers
-        .iter()
-        .map(|layer| &layer.id)
-        .zip(&addresses)
-        .collect();
-    // Weak: the same list may be sent compressed or not.
-    let tag = format!("W/\"{}\"", Digest::of_json(&names));
-    let headers = [
-        (header::ETAG, tag.clone()),
-        (header::CACHE_CONTROL, "no-cache".to_owned()),
-    ];
-    if has_tag(&asked, &tag) {
-        return Ok((StatusCode::NOT_MODIFIED, headers).into_response());
-    }
-    let listed = layers.iter().zip(addresses);
-    let products = listed
-        .map(|(layer, pinned)| product(layer, pinned))
-        .collect();
+    let products = layers.iter().map(|layer| product(layer)).collect();
+    // Its tag is of all that it says (`middleware/tag.rs`): another program says other things of the same versions.
+    let headers = [(header::CACHE_CONTROL, "no-cache")];
     Ok((headers, Json(Products { products })).into_response())
 }
 
-fn product(layer: &Layer, pinned: Vec<PinnedAddresses>) -> Product {
+fn product(layer: &Layer) -> Product {
     let manifest = &layer.manifest;
+    let modes = layer.modes().iter();
+    let pinned = modes.filter_map(|&mode| PinnedAddresses::of(layer, mode));
     let display = manifest.quantity.display();
     Product {
         listed: ListedProduct::of(manifest, layer.id.clone()),
@@ -177,7 +154,7 @@ fn product(layer: &Layer, pinned: Vec<PinnedAddresses>) -> Product {
             .map(|step| step.period.into())
             .collect(),
         modes: layer.modes(),
-        pinned,
+        pinned: pinned.collect(),
         legend: Legend::of(
             manifest.quantity,
             &TransferFunction::default_for(manifest.quantity),

@@ -64,7 +64,13 @@ pub(crate) async fn get(
     } else {
         None
     };
-    let content = state.cubes.get(&keys, &key, range.clone()).await?;
+    let bytes = range.as_ref().map_or(length, |part| part.end - part.start);
+    let read = state.cubes.get(&keys, &key, range.clone(), bytes);
+    let content = read.await.inspect_err(|error| {
+        if matches!(error, ServerError::Busy) {
+            state.metrics.refused.inc();
+        }
+    })?;
     let content = content.ok_or(ServerError::UnknownAddress)?;
     let described = [(header::CONTENT_TYPE, "application/octet-stream")];
     let Some(Range { start, end }) = range else {

@@ -142,6 +142,34 @@ async fn what_cannot_be_asked_is_refused_with_what_can() {
             "a region, a line, or lon and lat",
         ),
         (
+            "analysis?parts=trend&region=global&base=1991/2020",
+            "belongs to the climatology",
+        ),
+        (
+            "analysis?parts=extremes&region=global&bins=season",
+            "belongs to the climatology",
+        ),
+        (
+            "analysis?parts=anomaly&region=global&trend_step=year",
+            "belongs to the trend",
+        ),
+        (
+            "analysis?parts=trend&lon=1&lat=1&earth=sphere",
+            "a cell is taken as it is",
+        ),
+        (
+            "analysis?parts=trend&lon=1&lat=1&ocean=sst",
+            "in regions alone",
+        ),
+        (
+            "analysis?parts=trend&line=0,0;1,1&ocean=sst",
+            "in regions alone",
+        ),
+        (
+            "correlation?with=flux&lon=1&lat=1&earth=wgs84",
+            "a cell is taken as it is",
+        ),
+        (
             "analysis?parts=climatology&region=global&base=2020/1991",
             "FIRST/LAST",
         ),

@@ -16,7 +16,10 @@ use contract::event::Event;
 use contract::grid::LonLatDeg;
 use contract::job::RenderJob;
 use contract::manifest::{Manifest, ManifestId, Step};
-use contract::observation::{Filter, Observation, Page, Platform, TrackPoint, TrackQuery};
+use contract::observation::{
+    Filter, Observation, Page, Platform, PlatformList, TrackPoint, TrackQuery,
+};
+use contract::product::ProductId;
 use contract::quantity::Quantity;
 use contract::region::{AskedRegion, MaskCode};
 use contract::rows::{Columns, RowsForm};
@@ -590,12 +593,29 @@ impl Observer {
 
 #[async_trait]
 impl Observe for Observer {
-    async fn platforms(&self, filter: &Filter) -> Result<Vec<Platform>, BackendError> {
+    /// Those of the data sets that are asked for, up to the limit.
+    async fn platforms(&self, filter: &Filter) -> Result<PlatformList, BackendError> {
         self.asked(filter)?;
         if self.is_stuck.load(Ordering::SeqCst) {
             std::future::pending::<()>().await;
         }
-        Ok(self.platforms.lock().unwrap().clone())
+        let mut platforms = self.platforms.lock().unwrap().clone();
+        let is_asked = |own: &ProductId| filter.datasets.contains(own);
+        platforms.retain(|own| filter.datasets.is_empty() || is_asked(&own.dataset));
+        let is_complete = platforms.len() <= filter.limit as usize;
+        platforms.truncate(filter.limit as usize);
+        Ok(PlatformList {
+            platforms,
+            is_complete,
+        })
+    }
+
+    async fn datasets(&self) -> Result<Vec<ProductId>, BackendError> {
+        self.mood.lock().unwrap().clone().apply()?;
+        let platforms = self.platforms.lock().unwrap();
+        let mut datasets: Vec<_> = platforms.iter().map(|own| own.dataset.clone()).collect();
+        datasets.dedup();
+        Ok(datasets)
     }
 
     async fn track(&self, _query: &TrackQuery) -> Result<Vec<TrackPoint>, BackendError> {

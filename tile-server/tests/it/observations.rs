@@ -110,6 +110,21 @@ async fn many_buoys_take_no_ship_its_track_but_there_is_a_limit() {
 }
 
 #[tokio::test]
+async fn a_list_that_is_cut_says_so() {
+    let app = TestApp::new().await.observing();
+    let list = async |count: usize| {
+        let buoys = (0..count).map(|number| platform(&format!("{number}"), PlatformKind::Buoy));
+        *app.observer.platforms.lock().unwrap() = buoys.collect();
+        let body = app.get("/api/observations/platforms").await.json();
+        let shown = body["features"].as_array().unwrap().len();
+        (shown, body["is_complete"].as_bool().unwrap())
+    };
+    assert_eq!(list(0).await, (0, true));
+    assert_eq!(list(10_000).await, (10_000, true));
+    assert_eq!(list(10_001).await, (10_000, false));
+}
+
+#[tokio::test]
 async fn the_question_is_what_the_address_says() {
     let app = TestApp::new().await.observing();
     app.get("/api/observations/platforms?region=170,-10,-170,10&from=2020-01-01&to=2021-01-01&property=wind_speed&kind=ship")
@@ -206,12 +221,16 @@ async fn a_server_without_observations_says_so() {
 async fn a_data_set_that_is_not_there_is_told_with_those_that_are() {
     let app = TestApp::new().await.observing();
     *app.observer.platforms.lock().unwrap() = vec![platform("51001", PlatformKind::Buoy)];
-    let answer = app.get("/api/observations/floats/51001").await;
-    assert_eq!(answer.status, StatusCode::NOT_FOUND);
-    assert_eq!(
-        answer.reason(),
-        "there is no data set \"floats\"; there are buoys"
-    );
+    for path in ["floats/51001", "platforms?dataset=floats"] {
+        let answer = app.get(&format!("/api/observations/{path}")).await;
+        assert_eq!(answer.status, StatusCode::NOT_FOUND, "{path}");
+        assert_eq!(
+            answer.reason(),
+            "there is no data set \"floats\"; there are buoys"
+        );
+    }
+    let answer = app.get("/api/observations/platforms?dataset=buoys").await;
+    assert_eq!(answer.json()["features"].as_array().unwrap().len(), 1);
     // One that measured nothing then is there.
     let answer = app.get("/api/observations/buoys/51001?to=1990-01-01").await;
     assert_eq!(answer.status, StatusCode::OK);

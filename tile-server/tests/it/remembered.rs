@@ -57,10 +57,10 @@ const QUESTIONS: [Question; 9] = [
         ],
     ),
     (
-        "sst/analysis?region=global&parts=anomaly&base=1991/2020&bins=month&trend_step=month&min_coverage=0&from=2000-01&to=2000-03&earth=wgs84",
+        "sst/analysis?region=global&parts=anomaly,trend&base=1991/2020&bins=month&trend_step=month&min_coverage=0&from=2000-01&to=2000-03&earth=wgs84",
         &[
             ("global", "14n-50n"),
-            ("anomaly", "trend"),
+            ("anomaly", "climatology"),
             ("1991/2020", "1990/2020"),
             ("bins=month", "bins=season"),
             ("trend_step=month", "trend_step=year"),

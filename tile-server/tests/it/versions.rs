@@ -1,7 +1,9 @@
 //! `manifest=`: versions that were cited stay readable.
 
 use axum::http::StatusCode;
+use contract::manifest::Manifest;
 use contract::quantity::Quantity;
+use storage::{Store, manifests};
 
 use crate::app::TestApp;
 
@@ -40,6 +42,46 @@ async fn a_named_version_is_drawn_with_what_was_derived_from_it() {
         assert_eq!(job.accumulated, old.accumulated);
         assert!(job.accumulated.is_some());
     }
+}
+
+#[tokio::test]
+async fn a_version_keeps_what_was_derived_from_it_however_many_came_since() {
+    let (store, traffic) = Store::memory().counted();
+    let app = TestApp::over(store, |_settings| {});
+    let cited = app.land("flux", Quantity::CarbonFlux, 1).await;
+    let (lift, quantity) = ("flux-accumulated", Quantity::AccumulatedCarbon);
+    app.land_derived(lift, quantity, 1, Some(cited.clone()))
+        .await;
+    app.get("/tiles/flux/volume/0/0/0.png").await;
+    let old = app.drawer.last_job();
+    assert!(old.accumulated.is_some());
+    let skipped = app.land("flux", Quantity::CarbonFlux, 2).await;
+    let newest = app.land("flux", Quantity::CarbonFlux, 3).await;
+    let first = manifests::latest(&app.store, &lift.parse().unwrap()).await;
+    let first = first.unwrap().unwrap();
+    for number in 2..=71 {
+        let derived = Manifest {
+            number,
+            title: format!("Derivation {number}"),
+            derived_from: Some(newest.clone()),
+            ..first.clone()
+        };
+        manifests::commit(&app.store, &derived).await.unwrap();
+    }
+    let named = format!("/tiles/flux/volume/1/0/0.png?manifest={cited}");
+    assert_eq!(app.get(&named).await.status, StatusCode::OK);
+    assert_eq!(app.drawer.last_job().accumulated, old.accumulated);
+    // That nothing was derived from a version is looked up once.
+    let reads = async |x: u32| {
+        let before = traffic.counts();
+        let named = format!("/tiles/flux/volume/1/{x}/0.png?manifest={skipped}");
+        assert_eq!(app.get(&named).await.status, StatusCode::OK);
+        assert_eq!(app.drawer.last_job().accumulated, None);
+        traffic.counts().since(before).reads
+    };
+    let (looked_up, remembered) = (reads(0).await, reads(1).await);
+    assert!(looked_up > 50, "{looked_up} reads");
+    assert!(remembered < 10, "{remembered} reads");
 }
 
 #[tokio::test]

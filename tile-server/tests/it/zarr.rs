@@ -3,7 +3,8 @@
 use std::sync::Arc;
 
 use async_trait::async_trait;
-use axum::http::{StatusCode, header};
+use axum::body::{Body, to_bytes};
+use axum::http::{Request, StatusCode, header};
 use contract::digest::Digest;
 use contract::manifest::{MANIFEST_SCHEMA, Manifest, Step};
 use contract::quantity::{Flag, OpenQuantity, OpenWords, Quantity};
@@ -11,6 +12,7 @@ use contract::time::Period;
 use serde_json::{Value, json};
 use storage::attached::{Attachment, Failure, Reference, Source, StoreKind};
 use storage::{Store, domain, fields, manifests};
+use tower::ServiceExt as _;
 
 use crate::app::{GRID, TestApp};
 
@@ -132,6 +134,35 @@ async fn parts_are_those_of_the_whole_and_copies_are_known_again() {
     let cached = |answer: &crate::app::Answer| answer.headers[header::CACHE_CONTROL].clone();
     assert!(cached(&whole).to_str().unwrap().contains("immutable"));
     assert!(!cached(&metadata).to_str().unwrap().contains("immutable"));
+}
+
+#[tokio::test]
+async fn what_nobody_takes_counts_as_held_until_it_is_gone() {
+    let app = TestApp::new().await;
+    let path = "/zarr/flux@1/carbon_flux/c/0/0/0";
+    let held = async || app.metric("fluxglobe_tile_server_zarr_bytes").await;
+    let ask = async |range: Option<&str>| {
+        let mut request = Request::builder().uri(path);
+        if let Some(range) = range {
+            request = request.header(header::RANGE, range);
+        }
+        let request = request.body(Body::empty()).unwrap();
+        app.router.clone().oneshot(request).await.unwrap()
+    };
+    let length = app.get(path).await.body.len() as u64;
+    assert_eq!(held().await, 0);
+    let whole = ask(None).await;
+    assert_eq!(whole.status(), StatusCode::OK);
+    assert_eq!(held().await, length);
+    let part = ask(Some("bytes=0-9")).await;
+    assert_eq!(part.status(), StatusCode::PARTIAL_CONTENT);
+    assert_eq!(held().await, length + 10);
+    drop(whole);
+    assert_eq!(held().await, 10);
+    let taken = to_bytes(part.into_body(), 64).await.unwrap();
+    assert_eq!(taken.len(), 10);
+    drop(taken);
+    assert_eq!(held().await, 0);
 }
 
 #[tokio::test]

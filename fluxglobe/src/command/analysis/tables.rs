@@ -7,7 +7,7 @@ use contract::analysis::{
     Season, SeriesAnalysis, SeriesPlace, Trend,
 };
 
-use crate::progress;
+use crate::instants::Instants;
 
 /// Numbers of a row of bands that are shown on one line.
 const BANDS_SHOWN: usize = 12;
@@ -101,10 +101,11 @@ fn climatology(made: &Climatology, unit: &str) -> String {
 
 fn anomaly(made: &Anomalies, unit: &str) -> String {
     let normal = format!("normal {}", made.base);
+    let instants = Instants::of(made.rows.iter().flat_map(|row| [row.start, row.end]));
     let rows = made.rows.iter().map(|row| {
         vec![
-            progress::day(row.start),
-            progress::day(row.end),
+            instants.text(row.start),
+            instants.text(row.end),
             number(row.value),
             number(row.normal),
             number(row.anomaly),
@@ -191,11 +192,15 @@ fn season(made: &Season, unit: &str) -> String {
 
 fn extremes(made: &Extremes, unit: &str) -> String {
     let pairs = made.highest.iter().zip(&made.lowest);
+    let starts = pairs
+        .clone()
+        .flat_map(|(high, low)| [high.start, low.start]);
+    let instants = Instants::of(starts);
     let rows = pairs.map(|(high, low)| {
         vec![
-            progress::day(high.start),
+            instants.text(high.start),
             number(Some(high.value)),
-            progress::day(low.start),
+            instants.text(low.start),
             number(Some(low.value)),
         ]
     });
@@ -223,12 +228,14 @@ pub(super) fn of_correlation(answer: &Correlation) -> String {
 }
 
 pub(super) fn of_difference(answer: &Difference) -> String {
+    let sides = [&answer.of, &answer.minus];
+    let instants = Instants::of(sides.into_iter().flat_map(|side| [side.start, side.end]));
     let side = |name: &str, side: &contract::analysis::DifferenceSide| {
         vec![
             name.to_owned(),
             side.cited.manifest.to_string(),
-            progress::day(side.start),
-            progress::day(side.end),
+            instants.text(side.start),
+            instants.text(side.end),
             number(side.mean),
             side.count.to_string(),
         ]
@@ -283,12 +290,13 @@ pub(super) fn of_hovmoller(answer: &Hovmoller) -> String {
         format!("{}..{}", band.low_deg, band.high_deg)
     }));
     let header: Vec<&str> = header.iter().map(String::as_str).collect();
+    let instants = Instants::of(answer.rows.iter().map(|row| row.start));
     let rows = answer.rows.iter().map(|row| {
         let means = shown.iter().map(|band| match row.means[*band] {
             Some(mean) => format!("{mean:.3}"),
             None => String::new(),
         });
-        std::iter::once(progress::day(row.start))
+        std::iter::once(instants.text(row.start))
             .chain(means)
             .collect()
     });

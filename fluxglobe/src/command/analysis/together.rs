@@ -24,7 +24,7 @@ pub(crate) async fn correlate(settings: &Settings, options: &StatsCorrelate) -> 
     let wishes = SeriesWishes {
         from: options.from,
         to: options.to,
-        earth: Some(options.earth),
+        earth: options.earth,
         ..at(settings, &store, &options.place).await?
     };
     let series = series(wishes, &first.product)?;
@@ -72,7 +72,7 @@ pub(crate) async fn difference(settings: &Settings, options: &StatsDifference) -
     .await?;
     let minus = version(settings, &store, other, options.minus_manifest.as_ref()).await?;
     let wishes = SeriesWishes {
-        earth: Some(options.earth),
+        earth: options.earth,
         ..at(settings, &store, &options.place).await?
     };
     let all = series(wishes, &of.product)?;
@@ -121,6 +121,6 @@ async fn at(settings: &Settings, store: &Store, place: &Place) -> Result<SeriesW
 
 /// The series of a product that is asked for.
 pub(crate) fn series(wishes: SeriesWishes, product: &ProductId) -> Result<SeriesQuery> {
-    let query = wishes.query(product.clone());
+    let query = wishes.query(product.clone())?;
     query.context("give a region, a place or a line: --region, --at or --line")
 }

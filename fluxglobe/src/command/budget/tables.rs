@@ -5,7 +5,7 @@ use comfy_table::{CellAlignment, Table};
 use contract::budget::{BudgetAnswer, BudgetHistory, BudgetRow, RowDraws};
 
 use super::million_km2;
-use crate::progress;
+use crate::instants::Instants;
 
 /// Columns of days and words, which stand to the left.
 const WORDS: [&str; 6] = [
@@ -19,7 +19,10 @@ const WORDS: [&str; 6] = [
 
 /// A line a row; of several regions each has its lines, and the whole stands last.
 pub(super) fn of(answer: &BudgetAnswer) -> Table {
+    let regions = answer.regions.iter().flat_map(|region| &region.rows);
+    let rows = regions.chain(&answer.rows);
     let columns = Columns {
+        instants: Instants::of(rows.flat_map(|row| [row.start, row.end])),
         region: !answer.regions.is_empty(),
         uncertainty: answer.uncertainty.is_some(),
         draws: answer.rows.iter().any(|row| draws(row).is_some()),
@@ -62,6 +65,7 @@ fn table(header: Vec<&str>) -> Table {
 #[derive(Clone, Copy)]
 #[expect(clippy::struct_excessive_bools, reason = "one a group of columns")]
 struct Columns {
+    instants: Instants,
     region: bool,
     uncertainty: bool,
     draws: bool,
@@ -109,8 +113,8 @@ impl Columns {
             cells.push(region.to_owned());
         }
         cells.extend([
-            progress::day(row.start),
-            progress::day(row.end),
+            self.instants.text(row.start),
+            self.instants.text(row.end),
             format!("{:.3}", row.budget_tg),
         ]);
         if self.uncertainty {

@@ -246,7 +246,9 @@ pub(crate) async fn platforms_are_summed_up_over_what_is_wanted(home: &Home) {
         observation("buoy", 3, 1.0),
     ];
     store.upsert(&rows).await.unwrap();
-    let found = store.platforms(&Filter::default()).await.unwrap();
+    let all = store.platforms(&Filter::default()).await.unwrap();
+    assert!(all.is_complete);
+    let found = all.platforms;
     let names: Vec<_> = found
         .iter()
         .map(|p| (p.platform.as_str(), p.count))
@@ -262,13 +264,35 @@ pub(crate) async fn platforms_are_summed_up_over_what_is_wanted(home: &Home) {
         to: Some(rows[1].time),
         ..Filter::default()
     };
-    let found = store.platforms(&early).await.unwrap();
+    let found = store.platforms(&early).await.unwrap().platforms;
     assert_eq!((found[1].count, found[1].lon_deg), (1, 179.0));
-    let one = Filter {
-        limit: 1,
-        ..Filter::default()
-    };
-    assert_eq!(store.platforms(&one).await.unwrap().len(), 1);
+    for (limit, is_complete) in [(1, false), (2, true)] {
+        let some = Filter {
+            limit,
+            ..Filter::default()
+        };
+        let found = store.platforms(&some).await.unwrap();
+        assert_eq!(found.platforms.len(), limit as usize);
+        assert_eq!(found.is_complete, is_complete, "{limit} of two");
+    }
+}
+
+pub(crate) async fn every_dataset_is_named_however_many_platforms_others_have(home: &Home) {
+    let store = home.store();
+    assert_eq!(store.datasets().await.unwrap(), []);
+    let mut rows: Vec<_> = (0..20)
+        .map(|number| observation(&format!("platform-{number}"), 0, 1.0))
+        .collect();
+    for name in ["ships", "a-first", "z-last"] {
+        rows.push(Observation {
+            dataset: name.parse().unwrap(),
+            ..observation("one", 0, 1.0)
+        });
+    }
+    store.upsert(&rows).await.unwrap();
+    let found = store.datasets().await.unwrap();
+    let names: Vec<_> = found.iter().map(|name| name.as_str()).collect();
+    assert_eq!(names, ["a-first", "buoys", "ships", "z-last"]);
 }
 
 pub(crate) async fn a_track_has_one_place_for_each_time(home: &Home) {
@@ -301,7 +325,7 @@ pub(crate) async fn a_track_has_one_place_for_each_time(home: &Home) {
         limit: 2,
         ..query.clone()
     };
-    assert_eq!(lons(&two).await, [1.0, 2.0]);
+    assert_eq!(lons(&two).await, [1.0, 3.0]);
     let late = TrackQuery {
         from: Some(rows[3].time),
         to: Some(rows[0].time),
@@ -313,6 +337,34 @@ pub(crate) async fn a_track_has_one_place_for_each_time(home: &Home) {
         ..query
     };
     assert!(lons(&nobody).await.is_empty());
+}
+
+pub(crate) async fn a_long_track_is_thinned_and_ends_where_it_ends(home: &Home) {
+    let store = home.store();
+    // Over some months, so that it lies in several files.
+    let way: Vec<_> = (0..5000)
+        .map(|at| Observation {
+            lon_deg: f64::from(at) / 100.0,
+            ..observation("ship", i64::from(at) * 30, 1.0)
+        })
+        .collect();
+    store.upsert(&way).await.unwrap();
+    for (limit, expected) in [(1, 1), (2, 2), (100, 100), (4999, 2501), (5000, 5000)] {
+        let query = TrackQuery {
+            limit,
+            ..TrackQuery::new("buoys".parse().unwrap(), "ship")
+        };
+        let track = store.track(&query).await.unwrap();
+        assert_eq!(track.len(), expected, "{limit}");
+        assert!(track.is_sorted_by_key(|point| point.time));
+        let last = &track[track.len() - 1];
+        assert_eq!((last.time, last.lon_deg), (way[4999].time, 49.99));
+        if limit > 1 {
+            assert_eq!((track[0].time, track[0].lon_deg), (way[0].time, 0.0));
+            let every = (track[1].lon_deg * 100.0).round() as usize;
+            assert_eq!(track[1].time, way[every].time, "the places of the way");
+        }
+    }
 }
 
 pub(crate) async fn questions_beyond_their_limits_are_refused(home: &Home) {
@@ -348,5 +400,6 @@ pub(crate) async fn an_empty_home_is_ready_and_answers_with_nothing(home: &Home)
     let store = home.store();
     store.ready().await.unwrap();
     assert_eq!(all(store, Filter::default()).await, []);
-    assert_eq!(store.platforms(&Filter::default()).await.unwrap(), []);
+    let none = store.platforms(&Filter::default()).await.unwrap();
+    assert_eq!((none.platforms, none.is_complete), (vec![], true));
 }

@@ -192,7 +192,7 @@ pub(crate) async fn a_hundred_thousand_rows_are_stored_and_found(home: &Home) {
     assert_eq!(found.len(), rows.iter().filter(within).count());
     let answered = asked.elapsed();
     let summed = std::time::Instant::now();
-    let platforms = store.platforms(&Filter::default()).await.unwrap();
+    let platforms = store.platforms(&Filter::default()).await.unwrap().platforms;
     assert_eq!(platforms.iter().map(|p| p.count).sum::<u64>(), 100_000);
     println!(
         "100000 rows: stored in {stored:?}, again in {again:?}; region answered in {answered:?} ({} rows), platforms in {:?}",

@@ -7,7 +7,7 @@ import { KINDS } from "./words";
 const MOST_PAGES = 5;
 
 export const platforms = (signal: AbortSignal) =>
-  getJson<Answer<"platforms">>(address("api/observations/platforms"), signal).then((body) => body.features);
+  getJson<Answer<"platforms">>(address("api/observations/platforms"), signal);
 
 export function seriesUrl(dataset: string, platform: string, query: QueryTexts<"observations"> = {}): string {
   return address(`api/observations/${encodeURIComponent(dataset)}/${encodeURIComponent(platform)}`, { ...query });

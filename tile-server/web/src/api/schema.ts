@@ -1529,8 +1529,10 @@ export interface components {
         PlatformKind: "buoy" | "ship" | "station" | "profile";
         /** @description Platforms as GeoJSON (RFC 7946). */
         Platforms: {
-            /** @description By data set and name. */
+            /** @description By data set and name, the first 10,000. */
             features: components["schemas"]["PlatformFeature"][];
+            /** @description Are these all that the question is about? Where they are not, ask for one data set, a region or a period. */
+            is_complete: boolean;
             /** @enum {string} */
             type: "FeatureCollection";
         };

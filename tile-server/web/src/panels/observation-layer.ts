@@ -80,9 +80,10 @@ export class ObservationLayer {
     try {
       const found = await observations.platforms(asked.signal);
       if (asked.signal.aborted) return;
-      this.#platforms = found;
-      this.#layer.show(found, null);
-      this.#status.textContent = observations.countText(found);
+      this.#platforms = found.features;
+      this.#layer.show(found.features, null);
+      const count = observations.countText(found.features);
+      this.#status.textContent = found.is_complete ? count : `the first ones: ${count}`;
     } catch (error) {
       if (asked.signal.aborted) return;
       this.#onError("observations", error);
