@@ -101,7 +101,11 @@ const view = new ViewDialog(
   () => rangeOf(inventory.steps),
 );
 const controls = new Controls(byId("controls"), store, () => view.open());
-const legend = new LegendCard(controls.legend, (id, mode) => inventory.catalogue.usualLegend(id, mode), report);
+const legend = new LegendCard(
+  controls.legend,
+  (id, mode, manifest) => inventory.catalogue.usualLegend(id, mode, manifest),
+  report,
+);
 const timeline = new Timeline(byId("timeline"), store, isFollowed);
 const panels = new Panels(byId("panels"), store);
 const observed = new ObservationLayer(controls.observations, globe, store, panels, report);

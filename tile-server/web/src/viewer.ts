@@ -258,9 +258,10 @@ export class Viewer {
   /** A picture that is still to come brings its legend with it; until there is any, the legend is that of what is waited for. */
   #readyLegend(): void {
     const { store, inventory, stage, live, legend } = this.#parts;
-    const { product: id, mode } = store.state;
-    if (!inventory.product || id === null) return;
-    const layer = { product: id, mode, look: inventory.lookIn(mode) };
+    const { mode } = store.state;
+    if (!inventory.product) return;
+    const { product, manifest } = inventory.product;
+    const layer = { product, manifest, mode, look: inventory.lookIn(mode) };
     if (stage.shownKey === undefined && !live.isShown) void legend.show(layer);
     else legend.learn(layer);
   }

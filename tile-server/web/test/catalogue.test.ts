@@ -1,4 +1,4 @@
-//! Titles of what is new, each once.
+//! What the catalogue says of products: titles of what is new, each once, and legends of the versions that it has.
 import { describe, expect, it } from "vitest";
 import type { Product } from "../src/api/types";
 import { Catalogue } from "../src/state/catalogue";
@@ -40,5 +40,15 @@ describe("titles of news", () => {
     expect(catalogue.titlesOf(["flux", "flux-accumulated", "flux"])).toEqual(["CO₂ flux"]);
     expect(catalogue.titlesOf(["flux-accumulated"])).toEqual(["CO₂ flux, accumulated"]);
     expect(catalogue.titlesOf(["a-stranger"])).toEqual(["a-stranger"]);
+  });
+});
+
+describe("a legend", () => {
+  const catalogue = new Catalogue([product("flux", "CO2 flux")]);
+
+  it("is the product's own as long as its version is the one that is here", () => {
+    expect(catalogue.usualLegend("flux", "map")?.high).toBe(1);
+    expect(catalogue.usualLegend("flux", "map", "flux@1-00000000")?.high).toBe(1);
+    expect(catalogue.usualLegend("flux", "map", "flux@2-00000000")).toBeUndefined();
   });
 });

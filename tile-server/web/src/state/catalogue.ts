@@ -61,9 +61,10 @@ export class Catalogue {
     );
   }
 
-  /** What the colours mean as long as nobody chose others. */
-  usualLegend(id: string | null, mode: Mode): Legend | undefined {
+  /** What the colours mean as long as nobody chose others; undefined of another version than the one that is here, whose range may be another. */
+  usualLegend(id: string | null, mode: Mode, manifest?: string): Legend | undefined {
     const product = this.find(id);
+    if (manifest !== undefined && product?.manifest !== manifest) return undefined;
     return (mode === "flow" ? product?.flow_legend : undefined) ?? product?.legend;
   }
 
