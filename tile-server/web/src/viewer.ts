@@ -188,7 +188,7 @@ export class Viewer {
     store.set({ mode: "volume", camera: COAST, look: { ...store.state.look, coastlines: true } });
     // What accumulates stands highest at the end.
     const last = inventory.catalogue.stepsOf(product).at(-1);
-    if (last) this.#askedMs ??= last.midMs;
+    if (last) this.#askedMs ??= last.atMs;
   }
 
   /** Regions and the check table: the globe does not wait for them. */
@@ -235,7 +235,7 @@ export class Viewer {
     const timeMs = isAsked
       ? clampToRange(known, wantedMs)
       : isOutside(known, store.state.timeMs) || !Number.isFinite(store.state.timeMs)
-        ? (known[0]?.midMs ?? Number.NaN)
+        ? (known[0]?.atMs ?? Number.NaN)
         : store.state.timeMs;
     store.set({ mode, timeMs });
     this.#readyLegend();

@@ -1,4 +1,4 @@
-//! What the catalogue says of products: titles of what is new, each once, and legends of the versions that it has.
+//! What the catalogue says of products: titles of what is new, each once, legends of the versions that it has, and when values hold.
 import { describe, expect, it } from "vitest";
 import type { Product } from "../src/api/types";
 import { Catalogue } from "../src/state/catalogue";
@@ -50,5 +50,19 @@ describe("a legend", () => {
     expect(catalogue.usualLegend("flux", "map")?.high).toBe(1);
     expect(catalogue.usualLegend("flux", "map", "flux@1-00000000")?.high).toBe(1);
     expect(catalogue.usualLegend("flux", "map", "flux@2-00000000")).toBeUndefined();
+  });
+});
+
+describe("the instant that a step's values are those of", () => {
+  const steps = [{ start: "2000-01-01T00:00:00Z", end: "2000-02-01T00:00:00Z", mid: "2000-01-16T12:00:00Z" }];
+  const catalogue = new Catalogue([
+    { ...product("flux", "CO2 flux"), steps },
+    { ...product("flux-accumulated", "CO2 flux, accumulated"), quantity: "accumulated_carbon", steps },
+  ]);
+
+  it("is the middle, and of accumulated carbon the end, as pictures draw it", () => {
+    const at = (id: string) => catalogue.stepsOf(id).map((step) => new Date(step.atMs).toISOString());
+    expect(at("flux")).toEqual(["2000-01-16T12:00:00.000Z"]);
+    expect(at("flux-accumulated")).toEqual(["2000-02-01T00:00:00.000Z"]);
   });
 });

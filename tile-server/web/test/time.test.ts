@@ -118,7 +118,7 @@ describe("playback", () => {
 });
 
 describe("stored steps", () => {
-  const middles = STEPS.map((step) => step.midMs);
+  const middles = STEPS.map((step) => step.atMs);
   const [january, february, may] = middles as [number, number, number];
 
   it("are where play that pauses goes on to, never back, and at the end of the record the last one is", () => {
@@ -139,6 +139,25 @@ describe("stored steps", () => {
     expect(stepBeside(STEPS, at("2000-01-30T00:00:00Z"), -1)).toBe(january);
     expect(stepBeside(STEPS, february, -1)).toBe(january);
     expect([stepBeside(STEPS, may, 1), stepBeside(STEPS, january, -1)]).toEqual([undefined, undefined]);
+  });
+});
+
+describe("sums, which hold at the ends of steps", () => {
+  const SUMS = parseSteps([JAN, FEB, MAY], "end");
+
+  it("are gone to at their ends", () => {
+    expect(stepBeside(SUMS, at(JAN.start), 1)).toBe(at(JAN.end));
+    expect(stepBeside(SUMS, at(JAN.end), 1)).toBe(at(FEB.end));
+    expect(stepBeside(SUMS, at(MAY.end), -1)).toBe(at(FEB.end));
+    expect(stepAhead(SUMS, at("2000-01-20T00:00:00Z"))).toBe(at(JAN.end));
+    expect(stepAhead(SUMS, at(MAY.end))).toBe(at(MAY.end));
+  });
+
+  it("are played to the last end, where the sum is whole, and then from the start", () => {
+    expect(toIso(nextInstant(SUMS, at("2000-05-28T03:00:00Z"), 1))).toBe(MAY.end);
+    expect(toIso(nextInstant(SUMS, at(MAY.end), 1))).toBe(JAN.start);
+    expect(toIso(nextInstant(SUMS, at(MAY.end), 8))).toBe(JAN.start);
+    expect(toIso(nextInstant(SUMS, at(MAY.start), 8))).toBe(MAY.end);
   });
 });
 

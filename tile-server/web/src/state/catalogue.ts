@@ -1,9 +1,9 @@
 //! The products as the page uses them: steps parsed, and the layer that a state describes.
-import type { Legend, Mode, Product } from "../api/types";
+import type { Legend, Mode, Product, Quantity } from "../api/types";
 import type { LayerSpec } from "../globe/layer";
 import { effective, type Look } from "../look/look";
 import { titleText } from "../page/format";
-import { clampToRange, parseSteps, type Step, toIso } from "../time/steps";
+import { clampToRange, type HoldsAt, parseSteps, type Step, toIso } from "../time/steps";
 import type { State } from "./store";
 
 /** The quantity budgets are made of. */
@@ -13,6 +13,11 @@ const ACCUMULATED = "accumulated_carbon";
 /** The quantity reliefs are made of. */
 const ELEVATION = "elevation";
 
+/** Accumulated carbon grows from nothing at the first start, and what a step holds is there at its end. */
+export function holdsAt(quantity: Quantity): HoldsAt {
+  return quantity === ACCUMULATED ? "end" : "mid";
+}
+
 export class Catalogue {
   readonly products: readonly Product[];
   readonly #steps = new Map<string, readonly Step[]>();
@@ -21,7 +26,7 @@ export class Catalogue {
   constructor(products: readonly Product[], before?: Catalogue) {
     this.products = products;
     this.#revisions = new Map(before ? before.#revisions : []);
-    for (const product of products) this.#steps.set(product.product, parseSteps(product.steps));
+    for (const product of products) this.#steps.set(product.product, parseSteps(product.steps, holdsAt(product.quantity)));
   }
 
   find(id: string | null): Product | undefined {

@@ -112,7 +112,7 @@ export class Timeline {
   #jump(direction: 1 | -1): void {
     const [first, last] = [this.#steps[0], this.#steps.at(-1)];
     if (!first || !last) return;
-    const beyond = direction > 0 ? first.midMs : last.midMs;
+    const beyond = direction > 0 ? first.atMs : last.atMs;
     this.#stepTo(stepBeside(this.#steps, this.#store.state.timeMs, direction) ?? beyond);
   }
 
