@@ -66,7 +66,7 @@ const connection = new Connection(
 const report = (key: string, error: unknown) => connection.report(key, error);
 const sources = new TileSources();
 const stage = new LayerStage(globe.scene, sources, counts, store.state.opacity, {
-  onRefused: (error) => report("layer", error),
+  onRefused: (error) => connection.layerRefused(error),
   onFailed: (failure) => void connection.tileFailed(failure),
 });
 const presenter = new Presenter(stage);
@@ -97,11 +97,15 @@ const view = new ViewDialog(
   store,
   () => inventory.product?.modes ?? [],
   () => inventory.product?.synthetic ?? false,
-  (mode, timeMs) => inventory.viewIn(mode, timeMs),
+  (mode) => inventory.viewIn(mode),
   () => rangeOf(inventory.steps),
 );
 const controls = new Controls(byId("controls"), store, () => view.open());
-const legend = new LegendCard(controls.legend, (id, mode) => inventory.catalogue.usualLegend(id, mode), report);
+const legend = new LegendCard(
+  controls.legend,
+  (id, mode, manifest) => inventory.catalogue.usualLegend(id, mode, manifest),
+  report,
+);
 const timeline = new Timeline(byId("timeline"), store, isFollowed);
 const panels = new Panels(byId("panels"), store);
 const observed = new ObservationLayer(controls.observations, globe, store, panels, report);
@@ -180,7 +184,7 @@ const viewer = new Viewer(
 );
 keepAddress(store, (change) => viewer.goTo(change));
 void viewer.begin();
-new Updates((news) => void viewer.renew(news));
+new Updates((news, isAnew) => void viewer.renew(news, isAnew));
 
 function makeGlobe(): Globe {
   try {

@@ -21,6 +21,7 @@ import { drawCheck } from "./panels/check";
 import type { Controls } from "./panels/controls";
 import type { Panels } from "./panels/panels";
 import type { PlacePanel } from "./panels/place";
+import type { Catalogue } from "./state/catalogue";
 import type { Inventory } from "./state/inventory";
 import { INITIAL, type State, type Store } from "./state/store";
 import { clampToRange, isOutside, outsideText } from "./time/steps";
@@ -125,26 +126,32 @@ export class Viewer {
     await this.#loadAside();
   }
 
-  /** Shows what is new in the page that is open: what did not change stays as it is. */
-  async renew(all: News[]): Promise<void> {
+  /**
+   * Shows what is new in the page that is open: what did not change stays as it is. `isAnew`: news may have been missed, so
+   * that the server's list is held against the one that is here.
+   */
+  async renew(told: News[], isAnew: boolean): Promise<void> {
     const { store, inventory, notices, controls, sources, placePanel, budgetPanel, lookPanel, report } = this.#parts;
-    const before = inventory.product;
-    for (const news of all) {
-      // Told again of a version that is known: what lifts its particles is there now.
-      const { catalogue } = inventory;
-      if (catalogue.find(news.product)?.manifest === news.manifest) catalogue.revise(news.product);
-    }
-    const relief = store.state.look.relief;
-    const isReliefNew = before !== undefined && all.some((news) => news.product === relief);
-    if (isReliefNew) inventory.catalogue.revise(before.product);
+    let known: Catalogue;
     try {
-      await inventory.renew();
+      known = await inventory.renew();
     } catch (error) {
       report("products", error);
       return;
     }
-    sources.forget();
     const { catalogue } = inventory;
+    const missed = isAnew ? catalogue.newsSince(known) : [];
+    const all = [...told, ...missed.filter(({ product }) => told.every((news) => news.product !== product))];
+    if (all.length === 0) return;
+    const before = known.find(store.state.product);
+    for (const news of all) {
+      // Told again of a version that is known: what lifts its particles is there now.
+      if (known.find(news.product)?.manifest === news.manifest) catalogue.revise(news.product);
+    }
+    const relief = store.state.look.relief;
+    const isReliefNew = before !== undefined && all.some((news) => news.product === relief);
+    if (isReliefNew) catalogue.revise(before.product);
+    sources.forget();
     notices.tell("news", `New data: ${catalogue.titlesOf(all.map((news) => news.product)).join(", ")}`);
     controls.setProducts(catalogue.products);
     const now = inventory.product;
@@ -188,7 +195,7 @@ export class Viewer {
     store.set({ mode: "volume", camera: COAST, look: { ...store.state.look, coastlines: true } });
     // What accumulates stands highest at the end.
     const last = inventory.catalogue.stepsOf(product).at(-1);
-    if (last) this.#askedMs ??= last.midMs;
+    if (last) this.#askedMs ??= last.atMs;
   }
 
   /** Regions and the check table: the globe does not wait for them. */
@@ -223,7 +230,7 @@ export class Viewer {
     document.title = `${titleText(chosen)} – Fluxglobe`;
     const known = inventory.steps;
     timeline.setSteps(known);
-    budgetPanel.setSteps(known);
+    budgetPanel.setSteps(chosen.product, known);
     lookPanel.draw();
     if (known.length === 0) notices.show("steps", `“${chosen.title}” has no periods yet.`);
     else notices.clear("steps");
@@ -235,7 +242,7 @@ export class Viewer {
     const timeMs = isAsked
       ? clampToRange(known, wantedMs)
       : isOutside(known, store.state.timeMs) || !Number.isFinite(store.state.timeMs)
-        ? (known[0]?.midMs ?? Number.NaN)
+        ? (known[0]?.atMs ?? Number.NaN)
         : store.state.timeMs;
     store.set({ mode, timeMs });
     this.#readyLegend();
@@ -258,9 +265,10 @@ export class Viewer {
   /** A picture that is still to come brings its legend with it; until there is any, the legend is that of what is waited for. */
   #readyLegend(): void {
     const { store, inventory, stage, live, legend } = this.#parts;
-    const { product: id, mode } = store.state;
-    if (!inventory.product || id === null) return;
-    const layer = { product: id, mode, look: inventory.lookIn(mode) };
+    const { mode } = store.state;
+    if (!inventory.product) return;
+    const { product, manifest } = inventory.product;
+    const layer = { product, manifest, mode, look: inventory.lookIn(mode) };
     if (stage.shownKey === undefined && !live.isShown) void legend.show(layer);
     else legend.learn(layer);
   }

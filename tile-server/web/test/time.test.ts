@@ -118,7 +118,7 @@ describe("playback", () => {
 });
 
 describe("stored steps", () => {
-  const middles = STEPS.map((step) => step.midMs);
+  const middles = STEPS.map((step) => step.atMs);
   const [january, february, may] = middles as [number, number, number];
 
   it("are where play that pauses goes on to, never back, and at the end of the record the last one is", () => {
@@ -142,6 +142,25 @@ describe("stored steps", () => {
   });
 });
 
+describe("sums, which hold at the ends of steps", () => {
+  const SUMS = parseSteps([JAN, FEB, MAY], "end");
+
+  it("are gone to at their ends", () => {
+    expect(stepBeside(SUMS, at(JAN.start), 1)).toBe(at(JAN.end));
+    expect(stepBeside(SUMS, at(JAN.end), 1)).toBe(at(FEB.end));
+    expect(stepBeside(SUMS, at(MAY.end), -1)).toBe(at(FEB.end));
+    expect(stepAhead(SUMS, at("2000-01-20T00:00:00Z"))).toBe(at(JAN.end));
+    expect(stepAhead(SUMS, at(MAY.end))).toBe(at(MAY.end));
+  });
+
+  it("are played to the last end, where the sum is whole, and then from the start", () => {
+    expect(toIso(nextInstant(SUMS, at("2000-05-28T03:00:00Z"), 1))).toBe(MAY.end);
+    expect(toIso(nextInstant(SUMS, at(MAY.end), 1))).toBe(JAN.start);
+    expect(toIso(nextInstant(SUMS, at(MAY.end), 8))).toBe(JAN.start);
+    expect(toIso(nextInstant(SUMS, at(MAY.start), 8))).toBe(MAY.end);
+  });
+});
+
 describe("texts", () => {
   it("write instants in UTC", () => {
     expect(formatInstant(at("2000-07-04T05:06:00Z"))).toBe("4 Jul 2000, 05:06 UTC");
@@ -154,6 +173,20 @@ describe("texts", () => {
     expect(stepLabel(step("2000-01-01T00:00:00Z", "2001-01-01T00:00:00Z"))).toBe("2000");
     expect(stepLabel(step("2002-01-05T00:00:00Z", "2002-01-06T00:00:00Z"))).toBe("5 Jan 2002");
     expect(stepLabel(step("2002-01-05T06:00:00Z", "2002-01-05T12:00:00Z"))).toBe("5 Jan 2002 06:00");
+    expect(stepLabel(step("2000-01-16T00:00:00Z", "2000-02-16T00:00:00Z"))).toBe("Jan 2000");
+  });
+
+  it("label a step of more than a day, month or year by its first and last", () => {
+    const label = (start: string, end: string) => stepLabel(parseSteps([month(`${start}T00:00:00Z`, `${end}T00:00:00Z`)])[0] as Step);
+    expect(label("2000-09-01", "2000-12-01")).toBe("Sep–Nov 2000");
+    expect(label("2000-12-01", "2001-03-01")).toBe("Dec 2000–Feb 2001");
+    expect(label("2000-01-01", "2010-01-01")).toBe("2000–2009");
+    expect(label("2002-01-05", "2002-01-13")).toBe("5–12 Jan 2002");
+    expect(label("2002-01-29", "2002-02-06")).toBe("29 Jan–5 Feb 2002");
+    expect(label("2001-12-27", "2002-01-04")).toBe("27 Dec 2001–3 Jan 2002");
+    expect(label("1999-03-15", "2000-06-01")).toBe("15 Mar 1999–31 May 2000");
+    expect(label("2000-01-01", "2001-03-01")).toBe("Jan 2000–Feb 2001");
+    expect(label("2001-01-05", "2002-01-05")).toBe("2001");
   });
 });
 

@@ -14,9 +14,9 @@ export function layerInfo(product: string, mode: Mode, manifest: string, look: r
   return getJson<TileJson>(address(`tiles/${encodeURIComponent(product)}/${mode}.json`, { ...query }));
 }
 
-/** What the colours of a look mean; `colours` are the parameters of it that a legend goes by. Only a flow's are of another value. */
-export function legend(product: string, mode: Mode, colours: readonly Parameter[]): Promise<Legend> {
-  const query: QueryTexts<"legend"> = { ...(mode === "flow" ? { mode } : {}), ...Object.fromEntries(colours) };
+/** What the colours of a look of a version mean; `colours` are the parameters of it that a legend goes by. Only a flow's are of another value. */
+export function legend(product: string, mode: Mode, manifest: string, colours: readonly Parameter[]): Promise<Legend> {
+  const query: QueryTexts<"legend"> = { manifest, ...(mode === "flow" ? { mode } : {}), ...Object.fromEntries(colours) };
   return getJson<Answer<"legend">>(address(`api/products/${encodeURIComponent(product)}/legend.json`, { ...query }));
 }
 

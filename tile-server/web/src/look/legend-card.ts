@@ -9,6 +9,8 @@ import type { Look } from "./look";
 /** What colours depend on. */
 export interface Coloured {
   readonly product: string;
+  /** The version: where a quantity has no range of its own, colours go by the values of all its steps. */
+  readonly manifest: string;
   readonly mode: Mode;
   readonly look: Look;
 }
@@ -16,19 +18,18 @@ export interface Coloured {
 /** Ranges are typed by hand: nobody comes back to more than these. */
 const MOST_KNOWN = 50;
 
+/** The legend of a version in its own colours, where it is known without asking. */
+type Usual = (product: string, mode: Mode, manifest: string) => Legend | undefined;
+
 export class LegendCard {
   readonly #slot: HTMLElement;
-  readonly #usual: (product: string, mode: Mode) => Legend | undefined;
+  readonly #usual: Usual;
   readonly #onError: (key: string, error: unknown) => void;
   readonly #known = new Map<string, Promise<Legend>>();
   #wanted = "";
   #shown = "";
 
-  constructor(
-    slot: HTMLElement,
-    usual: (product: string, mode: Mode) => Legend | undefined,
-    onError: (key: string, error: unknown) => void,
-  ) {
+  constructor(slot: HTMLElement, usual: Usual, onError: (key: string, error: unknown) => void) {
     this.#slot = slot;
     this.#usual = usual;
     this.#onError = onError;
@@ -56,13 +57,13 @@ export class LegendCard {
 
   async #legendOf(layer: Coloured): Promise<Legend> {
     const colours = colourParameters(layer.look);
-    const usual = colours.length === 0 ? this.#usual(layer.product, layer.mode) : undefined;
+    const usual = colours.length === 0 ? this.#usual(layer.product, layer.mode, layer.manifest) : undefined;
     if (usual) return usual;
     const key = keyOf(layer);
     const known = this.#known.get(key);
     if (known) return known;
     if (this.#known.size >= MOST_KNOWN) this.#known.clear();
-    const asked = api.legend(layer.product, layer.mode, colours);
+    const asked = api.legend(layer.product, layer.mode, layer.manifest, colours);
     this.#known.set(key, asked);
     // What failed is asked for again.
     asked.catch(() => this.#known.delete(key));
@@ -70,6 +71,6 @@ export class LegendCard {
   }
 }
 
-function keyOf({ product, mode, look }: Coloured): string {
-  return `${product}/${mode === "flow" ? mode : ""}?${queryOf(colourParameters(look))}`;
+function keyOf({ product, manifest, mode, look }: Coloured): string {
+  return `${product}:${manifest}/${mode === "flow" ? mode : ""}?${queryOf(colourParameters(look))}`;
 }

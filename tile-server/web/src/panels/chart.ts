@@ -47,7 +47,7 @@ export function seriesChart(
     ],
     hooks: { drawAxes: [(plot) => zeroLine(plot)], draw: [(plot) => nowLine(plot, now)] },
   };
-  const data: uPlot.AlignedData = [samples.map((sample) => sample.midMs / 1000), samples.map((sample) => sample.value)];
+  const data: uPlot.AlignedData = [samples.map((sample) => sample.atMs / 1000), samples.map((sample) => sample.value)];
   const { plot, destroy } = mount(container, options, data);
   plot.over.addEventListener("click", (event) => onPick(plot.posToVal(event.offsetX, "x") * 1000));
   return {
@@ -141,7 +141,7 @@ export function dress(labelY: string): Omit<uPlot.Options, "width" | "height" | 
         labelSize: 20,
         labelGap: 2,
         size: 46,
-        values: (_plot, splits) => splits.map((value) => String(Number(value.toPrecision(6))).replace("-", "−")),
+        values: (_plot, splits) => splits.map((value) => String(Number(value.toPrecision(6))).replaceAll("-", "−")),
       },
     ],
   };

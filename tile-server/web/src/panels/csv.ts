@@ -2,6 +2,9 @@
 import type { Budget, PointSeries } from "../api/types";
 
 export function seriesCsv(answer: PointSeries): string {
+  // What sums hold stands beside them.
+  const isCounted = answer.series.some((row) => row.contributed);
+  const counted = isCounted ? ["contributed_steps", "contributed_of_steps", "contributed_time_percent"] : [];
   return lines(
     [
       `product: ${answer.product}`,
@@ -9,8 +12,11 @@ export function seriesCsv(answer: PointSeries): string {
       `cell centre: lon ${answer.cell.lon_deg}, lat ${answer.cell.lat_deg}`,
       `unit: ${answer.unit}`,
     ],
-    ["start", "end", "mid", "value"],
-    answer.series.map((row) => [row.start, row.end, row.mid, row.value]),
+    ["start", "end", "mid", "value", ...counted],
+    answer.series.map(({ start, end, mid, value, contributed: held }) => [
+      ...[start, end, mid, value],
+      ...(isCounted ? [held?.steps ?? null, held?.of_steps ?? null, held?.time_percent ?? null] : []),
+    ]),
   );
 }
 

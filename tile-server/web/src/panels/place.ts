@@ -7,12 +7,13 @@ import { el, icon, saveText } from "../page/dom";
 import { chemistry, latText, lonText, unitText, valueText } from "../page/format";
 import { DOWNLOAD } from "../page/icons";
 import type { Place } from "../state/camera";
+import { holdsAt } from "../state/catalogue";
 import type { Store } from "../state/store";
 import { clampToRange, formatInstant, parseSteps, quantise, rangeOf, type Step } from "../time/steps";
 import { type Chart, seriesChart } from "./chart";
 import { seriesCsv } from "./csv";
 import { manifestLine } from "./manifest";
-import { hasData, type Sample, valueAt } from "./series";
+import { hasData, missingText, type Sample, samplesOf, valueAt } from "./series";
 
 export interface PlaceContext {
   store: Store;
@@ -29,7 +30,14 @@ export class PlacePanel {
   readonly #lon = el("input", { type: "number", id: "place-lon", min: "-180", max: "360", step: "any" });
   #asked: AbortController | undefined;
   #shown:
-    | { samples: Sample[]; unit: string; chart: Chart | undefined; value: HTMLElement; when: HTMLElement }
+    | {
+        samples: Sample[];
+        unit: string;
+        chart: Chart | undefined;
+        value: HTMLElement;
+        when: HTMLElement;
+        missing: HTMLElement;
+      }
     | undefined;
 
   constructor(body: HTMLElement, context: PlaceContext) {
@@ -95,7 +103,8 @@ export class PlacePanel {
   }
 
   #draw(place: Place, answer: PointSeries): void {
-    const samples = answer.series.map((row) => ({ midMs: Date.parse(row.mid), value: row.value }));
+    const holds = holdsAt(answer.quantity);
+    const samples = samplesOf(answer.series, holds);
     const unit = unitText(answer.unit);
     const cell = el(
       "p",
@@ -113,23 +122,26 @@ export class PlacePanel {
     }
     const value = el("strong", { id: "place-value" });
     const when = el("span", { class: "muted" });
+    const missing = el("p", { class: "problem", id: "place-missing", hidden: true });
     const plot = el("div", {
       class: "plot",
       id: "series-plot",
       role: "img",
-      "data-points": String(samples.length),
-      "aria-label": `Series of ${samples.length} values in ${unit}`,
+      "data-points": String(answer.series.length),
+      "aria-label": `Series of ${answer.series.length} values in ${unit}`,
     });
-    const gaps = samples.filter((sample) => sample.value === null).length;
+    const gaps = answer.series.filter((row) => row.value === null).length;
+    const between = holds === "mid" ? "middles" : "ends, from zero at the first start";
     this.#content.replaceChildren(
       this.#title(place),
       el("p", { class: "muted" }, chemistry(this.#context.label())),
       el("p", { class: "reading" }, value, el("span", { class: "unit" }, unit), when),
+      missing,
       plot,
       el(
         "p",
         { class: "muted" },
-        `${samples.length} periods${gaps > 0 ? `, ${gaps} without data` : ""}; linear in time between their middles.`,
+        `${answer.series.length} periods${gaps > 0 ? `, ${gaps} without data` : ""}; linear in time between their ${between}.`,
       ),
       cell,
       manifestLine(answer.manifest),
@@ -159,7 +171,7 @@ export class PlacePanel {
       const steps = this.#context.steps();
       this.#context.store.set({ timeMs: quantise(steps, clampToRange(steps, timeMs)) });
     });
-    this.#shown = { samples, unit, chart, value, when };
+    this.#shown = { samples, unit, chart, value, when, missing };
     this.#drawNow();
   }
 
@@ -170,6 +182,8 @@ export class PlacePanel {
     const value = valueAt(shown.samples, timeMs);
     shown.value.textContent = value === null ? "no data" : valueText(value, 3);
     shown.when.textContent = formatInstant(timeMs);
+    shown.missing.textContent = missingText(shown.samples, timeMs);
+    shown.missing.hidden = shown.missing.textContent === "";
     shown.chart?.setNow(timeMs);
   }
 

@@ -1,9 +1,9 @@
 //! The products as the page uses them: steps parsed, and the layer that a state describes.
-import type { Legend, Mode, Product } from "../api/types";
+import type { Legend, Mode, News, Product, Quantity } from "../api/types";
 import type { LayerSpec } from "../globe/layer";
 import { effective, type Look } from "../look/look";
 import { titleText } from "../page/format";
-import { clampToRange, parseSteps, type Step, toIso } from "../time/steps";
+import { clampToRange, type HoldsAt, parseSteps, type Step, toIso } from "../time/steps";
 import type { State } from "./store";
 
 /** The quantity budgets are made of. */
@@ -13,6 +13,11 @@ const ACCUMULATED = "accumulated_carbon";
 /** The quantity reliefs are made of. */
 const ELEVATION = "elevation";
 
+/** Accumulated carbon grows from nothing at the first start, and what a step holds is there at its end. */
+export function holdsAt(quantity: Quantity): HoldsAt {
+  return quantity === ACCUMULATED ? "end" : "mid";
+}
+
 export class Catalogue {
   readonly products: readonly Product[];
   readonly #steps = new Map<string, readonly Step[]>();
@@ -21,7 +26,7 @@ export class Catalogue {
   constructor(products: readonly Product[], before?: Catalogue) {
     this.products = products;
     this.#revisions = new Map(before ? before.#revisions : []);
-    for (const product of products) this.#steps.set(product.product, parseSteps(product.steps));
+    for (const product of products) this.#steps.set(product.product, parseSteps(product.steps, holdsAt(product.quantity)));
   }
 
   find(id: string | null): Product | undefined {
@@ -56,14 +61,34 @@ export class Catalogue {
 
   /** Carbon that accumulated lifts the product's particles. */
   isLifted(id: string): boolean {
-    return this.products.some(
+    return this.#liftersOf(id).length > 0;
+  }
+
+  /**
+   * What became new since an older list, told as the server tells it: versions, and those whose particles others lift now.
+   * Which times they touch nobody knows, so it is all. Nothing where there was no list.
+   */
+  newsSince(before: Catalogue): News[] {
+    if (before.products.length === 0) return [];
+    const isNew = ({ product, manifest }: Product) => before.find(product)?.manifest !== manifest;
+    const all = this.products.filter((product) => isNew(product) || this.#liftersOf(product.product).some(isNew));
+    return all.map(({ product, manifest, start, end }) => ({
+      product,
+      manifest,
+      touched: typeof start === "string" && typeof end === "string" ? [{ start, end }] : [],
+    }));
+  }
+
+  #liftersOf(id: string): Product[] {
+    return this.products.filter(
       (product) => product.quantity === ACCUMULATED && product.derived_from?.startsWith(`${id}@`),
     );
   }
 
-  /** What the colours mean as long as nobody chose others. */
-  usualLegend(id: string | null, mode: Mode): Legend | undefined {
+  /** What the colours mean as long as nobody chose others; undefined of another version than the one that is here, whose range may be another. */
+  usualLegend(id: string | null, mode: Mode, manifest?: string): Legend | undefined {
     const product = this.find(id);
+    if (manifest !== undefined && product?.manifest !== manifest) return undefined;
     return (mode === "flow" ? product?.flow_legend : undefined) ?? product?.legend;
   }
 

@@ -1,11 +1,15 @@
 //! Pure time maths: product steps and instants in, positions on the time axis, quantised instants and readable labels out. All times are UTC.
 
-/** One stored period of a product, whose values are those of its middle. Instants in milliseconds since 1970-01-01T00:00:00Z; `endMs` is exclusive. */
+/** One stored period of a product. Instants in milliseconds since 1970-01-01T00:00:00Z; `endMs` is exclusive. */
 export interface Step {
   readonly startMs: number;
   readonly endMs: number;
-  readonly midMs: number;
+  /** The instant that its values are those of. */
+  readonly atMs: number;
 }
+
+/** Where in its period a value holds: a mean in the middle, a sum since the first start at the end. */
+export type HoldsAt = "mid" | "end";
 
 /** Playback and dragging ask for instants on this raster only, so that a second pass finds its tiles cached. */
 export const PARTS_PER_STEP = 8;
@@ -16,10 +20,13 @@ const DAY_MS = 86_400_000;
 const DAY_S = DAY_MS / 1000;
 const MONTHS = ["Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", "Nov", "Dec"];
 
-export function parseSteps(raw: readonly { start: string; end: string; mid: string }[]): Step[] {
+export function parseSteps(
+  raw: readonly { start: string; end: string; mid: string }[],
+  holdsAt: HoldsAt = "mid",
+): Step[] {
   return raw
-    .map((step) => ({ startMs: Date.parse(step.start), endMs: Date.parse(step.end), midMs: Date.parse(step.mid) }))
-    .filter((step) => Number.isFinite(step.startMs) && Number.isFinite(step.midMs) && step.endMs > step.startMs)
+    .map((step) => ({ startMs: Date.parse(step.start), endMs: Date.parse(step.end), atMs: Date.parse(step[holdsAt]) }))
+    .filter((step) => Number.isFinite(step.startMs) && Number.isFinite(step.atMs) && step.endMs > step.startMs)
     .sort((a, b) => a.startMs - b.startMs);
 }
 
@@ -84,24 +91,27 @@ export function quantise(steps: readonly Step[], timeMs: number): number {
 
 /**
  * The next playback instant: `strideParts` parts of a step on, on multiples of the stride, and from the end to the start.
- * The last raster point (the end of the range) shows what the range's last middle shows, so the loop skips it.
+ * The last raster point (the end of the range) shows what the range's last middle shows, so the loop skips it, unless the
+ * last value holds there.
  */
 export function nextInstant(steps: readonly Step[], timeMs: number, strideParts: number): number {
   const parts = Math.round(positionOf(steps, timeMs) * PARTS_PER_STEP);
   const next = (Math.floor(parts / strideParts) + 1) * strideParts;
-  return wholeSecond(instantAt(steps, next >= steps.length * PARTS_PER_STEP ? 0 : next / PARTS_PER_STEP));
+  const last = steps[steps.length - 1];
+  const mostParts = steps.length * PARTS_PER_STEP - (last && last.atMs < last.endMs ? 1 : 0);
+  return wholeSecond(instantAt(steps, next > mostParts ? 0 : next / PARTS_PER_STEP));
 }
 
-/** The stored step that play comes to next, or is at; beyond the last one, the last. */
+/** The instant of the stored step that play comes to next, or is at; beyond the last one, the last. */
 export function stepAhead(steps: readonly Step[], timeMs: number): number {
-  return (steps.find(({ midMs }) => midMs > timeMs - SECOND_MS) ?? steps.at(-1))?.midMs ?? timeMs;
+  return (steps.find(({ atMs }) => atMs > timeMs - SECOND_MS) ?? steps.at(-1))?.atMs ?? timeMs;
 }
 
-/** The stored step next to an instant; undefined where there is none. */
+/** The instant of the stored step next to an instant; undefined where there is none. */
 export function stepBeside(steps: readonly Step[], timeMs: number, direction: 1 | -1): number | undefined {
   return direction > 0
-    ? steps.find(({ midMs }) => midMs >= timeMs + SECOND_MS)?.midMs
-    : steps.filter(({ midMs }) => midMs <= timeMs - SECOND_MS).at(-1)?.midMs;
+    ? steps.find(({ atMs }) => atMs >= timeMs + SECOND_MS)?.atMs
+    : steps.filter(({ atMs }) => atMs <= timeMs - SECOND_MS).at(-1)?.atMs;
 }
 
 /** Some steps or parts of one further on, and from the end to the start; undefined without steps. */
@@ -136,15 +146,35 @@ export function formatInstant(timeMs: number): string {
   return `${date.getUTCDate()} ${MONTHS[date.getUTCMonth()]} ${date.getUTCFullYear()}, ${time} UTC`;
 }
 
-/** Shortest label that tells one step of the product from the next: month, day, or day and hour. */
-export function stepLabel(step: Step): string {
-  const start = new Date(step.startMs);
-  const days = (step.endMs - step.startMs) / DAY_MS;
-  const month = MONTHS[start.getUTCMonth()];
-  if (days > 300) return `${start.getUTCFullYear()}`;
-  if (days >= 27) return `${month} ${start.getUTCFullYear()}`;
-  const day = `${start.getUTCDate()} ${month} ${start.getUTCFullYear()}`;
-  return days >= 1 ? day : `${day} ${start.toISOString().slice(11, 16)}`;
+/** Shortest label that tells all of a step: its year, month or day where it is no more than one, day and hour, or from which to which. */
+export function stepLabel({ startMs, endMs }: Step): string {
+  const [start, end, last] = [new Date(startMs), new Date(endMs), new Date(endMs - 1)];
+  const days = (endMs - startMs) / DAY_MS;
+  const year = (date: Date) => [String(date.getUTCFullYear())];
+  const month = (date: Date) => [MONTHS[date.getUTCMonth()] ?? "", ...year(date)];
+  const day = (date: Date) => [String(date.getUTCDate()), ...month(date)];
+  if (days < 1) return `${day(start).join(" ")} ${start.toISOString().slice(11, 16)}`;
+  if (days === 1) return day(start).join(" ");
+  if (days > 300 && days <= 366) return year(start).join(" ");
+  if (days >= 27 && days <= 31) return month(start).join(" ");
+  if ([start, end].every(isNewYear)) return fromTo(year(start), year(last));
+  if ([start, end].every(isNewMonth)) return fromTo(month(start), month(last));
+  return fromTo(day(start), day(last));
+}
+
+/** `5–12 Jan 2002`: what both have at their ends is said once. */
+function fromTo(from: readonly string[], to: readonly string[]): string {
+  let own = from.length;
+  while (own > 0 && from[own - 1] === to[own - 1]) own -= 1;
+  return own === 0 ? to.join(" ") : `${from.slice(0, own).join(" ")}–${to.join(" ")}`;
+}
+
+function isNewMonth(date: Date): boolean {
+  return date.getUTCDate() === 1 && date.getTime() % DAY_MS === 0;
+}
+
+function isNewYear(date: Date): boolean {
+  return date.getUTCMonth() === 0 && isNewMonth(date);
 }
 
 /** Months by name and, where a year begins or at the first label, the year below; within days hours with the day below. */
