@@ -30,32 +30,38 @@ const NOTES: [&str; 2] = [
 struct Reads {
     grid: Grid,
     quantity: Quantity,
+    /// From when on accumulated carbon is summed; none of a flux.
+    since: Option<TimeMs>,
     steps: BTreeMap<Period, ObjectKey>,
 }
 
 impl Reads {
-    /// Of accumulated carbon that is the flux which it was accumulated from.
+    /// Of accumulated carbon that is the flux which it was accumulated from, from where accumulation starts on.
     async fn of(
         engine: &Engine,
         query: &BudgetQuery,
         manifest: &Manifest,
     ) -> Result<Self, ComputeError> {
         let source;
-        let manifest = match accumulated_from(manifest) {
+        let (manifest, since) = match accumulated_from(manifest) {
             Some(id) => {
                 source = manifests::load(engine.store(), id).await?;
-                &source
+                let start = manifest.extent().map(|own| own.start);
+                // The later of both; none is before any.
+                (&source, start.max(query.from))
             }
-            None => manifest,
+            None => (manifest, None),
         };
+        let from = since.or(query.from);
         let is_inside = |period: Period| {
-            query.from.is_none_or(|from| period.end > from)
+            from.is_none_or(|from| period.end > from)
                 && query.to.is_none_or(|to| period.start < to)
         };
         let steps = manifest.steps.iter().filter(|step| is_inside(step.period));
         Ok(Self {
             grid: manifest.grid,
             quantity: manifest.quantity,
+            since,
             steps: steps
                 .map(|step| (step.period, step.field.clone()))
                 .collect(),
@@ -88,6 +94,9 @@ impl Reads {
         }
         if self.quantity != before.quantity {
             words.push("another quantity".to_owned());
+        }
+        if let Some(since) = self.since.filter(|_| self.since != before.since) {
+            words.push(format!("accumulated from {since}"));
         }
         (counts, words.join(", "))
     }
