@@ -54,8 +54,7 @@ impl Reads {
         };
         let from = since.or(query.from);
         let is_inside = |period: Period| {
-            from.is_none_or(|from| period.end > from)
-                && query.to.is_none_or(|to| period.start < to)
+            from.is_none_or(|from| period.end > from) && query.to.is_none_or(|to| period.start < to)
         };
         let steps = manifest.steps.iter().filter(|step| is_inside(step.period));
         Ok(Self {
