@@ -180,6 +180,35 @@ async fn regions_sum_to_the_whole_with_what_they_share_and_leave_out() {
     }
 }
 
+/// Corners of regions that are added up are rounded by some millimetres, which along a wide box is more than a part in 10^9 of it.
+#[tokio::test(flavor = "multi_thread")]
+async fn rounded_corners_neither_reach_beyond_a_box_nor_leave_any_of_it_out() {
+    let (_folder, engine) = wavy().await;
+    let whole = "-142.4,16.4,-73.8,23";
+    let of = |squares: &[(&str, [f64; 4])]| BudgetQuery {
+        parts: Some(BudgetParts::Regions(regions(squares))),
+        ..total(&product("wavy"), whole)
+    };
+    let west = ("west", [-142.4, 16.4, -100.1, 23.0]);
+    let filling = [west, ("east", [-100.1, 16.4, -73.8, 23.0])];
+    let answer = ask(&engine, &of(&filling)).await;
+    let own = answer.closure.unwrap().regions.unwrap();
+    let wanted = "the regions fill the whole and do not overlap";
+    assert_eq!(own.summary, wanted);
+    let inside = ask(&engine, &of(&[west])).await;
+    let own = inside.closure.unwrap().regions.unwrap();
+    assert!(own.overlap_m2 <= 0.0 && own.left_out_m2 > 1e12);
+    // By 1e-4 degrees: 7.8 km2.
+    let beyond = [("beyond", [-100.1, 16.4, -73.7999, 23.0])];
+    let refused = budget(&engine, &of(&beyond)).await.unwrap_err();
+    assert!(refused.to_string().contains("reach 7."), "{refused}");
+    let gap = [west, ("east", [-100.0999, 16.4, -73.8, 23.0])];
+    let own = ask(&engine, &of(&gap)).await.closure.unwrap();
+    let own = own.regions.unwrap();
+    assert!((7e6..9e6).contains(&own.left_out_m2), "{}", own.summary);
+    assert!(own.summary.contains("leave 7."), "{}", own.summary);
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn every_code_of_a_mask_is_a_region() {
     let (_folder, store) = folder_store();
@@ -380,7 +409,12 @@ async fn rivers_of_a_part_of_the_sea_are_told_to_be_of_that_part() {
     assert!((20.0..80.0).contains(&percent), "{percent}");
     let wanted = format!("river flux rivers: its data cover {percent:.1} % of the region's sea");
     let told = |note: &&String| note.starts_with(&wanted);
-    assert_eq!(answer.notes.iter().filter(told).count(), 1, "{:?}", answer.notes);
+    assert_eq!(
+        answer.notes.iter().filter(told).count(),
+        1,
+        "{:?}",
+        answer.notes
+    );
     let (river_tg, of_part_tg) = (
         answer.rows[0].river.unwrap().river_tg,
         of_rivers.rows[0].budget_tg,
