@@ -13,7 +13,7 @@ use storage::manifests;
 
 use super::query::budget_of;
 use crate::derive::accumulated_from;
-use crate::{ComputeError, Engine};
+use crate::{ComputeError, Engine, catalogue};
 
 /// Most versions that are looked at, the newest.
 const MOST_VERSIONS: usize = 2000;
@@ -101,10 +101,29 @@ impl Reads {
     }
 }
 
+/// A version without a number holds nothing of the period; what has no number in any version is no history.
+///
+/// # Errors
+/// `UnknownProduct`; `NotAFlux`; `Contract` for a period that ends before it begins.
+async fn check_has_budget(engine: &Engine, query: &BudgetQuery) -> Result<(), ComputeError> {
+    let newest = catalogue::product(engine.store(), &query.product).await?;
+    if let (Some(from), Some(to)) = (query.from, query.to) {
+        Period::new(from, to)?;
+    }
+    match newest.quantity {
+        Quantity::CarbonFlux | Quantity::AccumulatedCarbon => Ok(()),
+        quantity => Err(ComputeError::NotAFlux {
+            product: newest.product,
+            quantity,
+        }),
+    }
+}
+
 /// The budget of a question by the versions of its product, oldest first.
 ///
 /// # Errors
-/// `UnknownProduct`; `Contract` for a question of several rows or more versions than are summed at once.
+/// `UnknownProduct`; `NotAFlux`; `Contract` for a period that ends before it begins, a question of several rows or more versions than are
+/// summed at once.
 pub fn history<'a>(
     engine: &'a Engine,
     query: &'a BudgetQuery,
@@ -116,13 +135,8 @@ pub fn history<'a>(
                 contract::ContractError::invalid("step", query.step.as_str(), reason).into(),
             );
         }
+        check_has_budget(engine, query).await?;
         let published = manifests::published(engine.store(), &query.product).await?;
-        if published.is_empty() {
-            return Err(ComputeError::UnknownProduct {
-                product: query.product.to_string(),
-                known: manifests::products(engine.store()).await?,
-            });
-        }
         let (version_count, skipped) = (
             published.len(),
             published.len().saturating_sub(MOST_VERSIONS),

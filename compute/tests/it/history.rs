@@ -188,6 +188,24 @@ async fn what_has_no_history_is_refused() {
         .await
         .unwrap_err();
     assert_eq!(unknown.class(), ErrorClass::NotFound);
+    let turned = BudgetQuery {
+        from: Some("2001".parse().unwrap()),
+        to: Some("2000".parse().unwrap()),
+        ..total(&product("flux"), "global")
+    };
+    let refused = history(&engine, &turned).await.unwrap_err();
+    assert!(refused.to_string().contains("after the start"), "{refused}");
+    let steps = [(
+        Period::month(2000, 1).unwrap(),
+        vec![290.0; GRID.cell_count()],
+    )];
+    let (id, sst) = (product("sst"), Quantity::SeaSurfaceTemperature);
+    land(engine.store(), &id, sst, GRID, &steps).await;
+    let refused = history(&engine, &total(&id, "global")).await.unwrap_err();
+    assert!(
+        refused.to_string().contains("no flux of carbon"),
+        "{refused}"
+    );
     let globe = ask(&engine, &total(&product("flux"), "global")).await;
     assert!(globe.uncertainty.is_none());
 }
