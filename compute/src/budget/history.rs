@@ -14,7 +14,7 @@ use storage::manifests;
 
 use super::query::budget_of;
 use crate::derive::accumulated_from;
-use crate::{ComputeError, Engine};
+use crate::{ComputeError, Engine, catalogue};
 
 /// Most versions that are looked at, the newest.
 const MOST_VERSIONS: usize = 2000;
@@ -31,32 +31,37 @@ const NOTES: [&str; 2] = [
 struct Reads {
     grid: Grid,
     quantity: Quantity,
+    /// From when on accumulated carbon is summed; none of a flux.
+    since: Option<TimeMs>,
     steps: BTreeMap<Period, ObjectKey>,
 }
 
 impl Reads {
-    /// Of accumulated carbon that is the flux which it was accumulated from.
+    /// Of accumulated carbon that is the flux which it was accumulated from, from where accumulation starts on.
     async fn of(
         engine: &Engine,
         query: &BudgetQuery,
         manifest: &Manifest,
     ) -> Result<Self, ComputeError> {
         let source;
-        let manifest = match accumulated_from(manifest) {
+        let (manifest, since) = match accumulated_from(manifest) {
             Some(id) => {
                 source = manifests::load(engine.store(), id).await?;
-                &source
+                let start = manifest.extent().map(|own| own.start);
+                // The later of both; none is before any.
+                (&source, start.max(query.from))
             }
-            None => manifest,
+            None => (manifest, None),
         };
+        let from = since.or(query.from);
         let is_inside = |period: Period| {
-            query.from.is_none_or(|from| period.end > from)
-                && query.to.is_none_or(|to| period.start < to)
+            from.is_none_or(|from| period.end > from) && query.to.is_none_or(|to| period.start < to)
         };
         let steps = manifest.steps.iter().filter(|step| is_inside(step.period));
         Ok(Self {
             grid: manifest.grid,
             quantity: manifest.quantity,
+            since,
             steps: steps
                 .map(|step| (step.period, step.field.clone()))
                 .collect(),
@@ -90,6 +95,9 @@ impl Reads {
         if self.quantity != before.quantity {
             words.push("another quantity".to_owned());
         }
+        if let Some(since) = self.since.filter(|_| self.since != before.since) {
+            words.push(format!("accumulated from {since}"));
+        }
         (counts, words.join(", "))
     }
 }
@@ -118,23 +126,37 @@ fn check_one_number(query: &BudgetQuery) -> Result<(), ContractError> {
     Ok(())
 }
 
+/// A version without a number holds nothing of the period; what has no number in any version is no history.
+///
+/// # Errors
+/// `UnknownProduct`; `NotAFlux`; `Contract` for a period that ends before it begins.
+async fn check_has_budget(engine: &Engine, query: &BudgetQuery) -> Result<(), ComputeError> {
+    let newest = catalogue::product(engine.store(), &query.product).await?;
+    if let (Some(from), Some(to)) = (query.from, query.to) {
+        Period::new(from, to)?;
+    }
+    match newest.quantity {
+        Quantity::CarbonFlux | Quantity::AccumulatedCarbon => Ok(()),
+        quantity => Err(ComputeError::NotAFlux {
+            product: newest.product,
+            quantity,
+        }),
+    }
+}
+
 /// The budget of a question by the versions of its product, oldest first.
 ///
 /// # Errors
-/// `UnknownProduct`; `Contract` for a question of several rows, of rivers or draws, or more versions than are summed at once.
+/// `UnknownProduct`; `NotAFlux`; `Contract` for a period that ends before it begins, a question of several rows, of rivers or draws, or more
+/// versions than are summed at once.
 pub fn history<'a>(
     engine: &'a Engine,
     query: &'a BudgetQuery,
 ) -> BoxFuture<'a, Result<BudgetHistory, ComputeError>> {
     Box::pin(async move {
         check_one_number(query)?;
+        check_has_budget(engine, query).await?;
         let published = manifests::published(engine.store(), &query.product).await?;
-        if published.is_empty() {
-            return Err(ComputeError::UnknownProduct {
-                product: query.product.to_string(),
-                known: manifests::products(engine.store()).await?,
-            });
-        }
         let (version_count, skipped) = (
             published.len(),
             published.len().saturating_sub(MOST_VERSIONS),

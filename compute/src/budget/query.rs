@@ -30,8 +30,9 @@ pub fn budget_of<'a>(
     Box::pin(async move {
         let mut answer = of_region(engine, query, manifest).await?;
         if let Some(asked) = &query.river {
-            let river = river::River::of(engine, query, asked, &answer.rows).await?;
+            let river = river::River::of(engine, query, asked, &answer).await?;
             river.take_off(&mut answer.rows);
+            answer.notes.extend(river.notes);
             answer.river = Some(river.basis);
         }
         if let Some(asked) = &query.parts {

@@ -1,20 +1,30 @@
 //! The budget less what rivers bring: outgassing of their carbon, as a number a year or summed from a product.
 
-use contract::budget::{AskedRiver, BudgetQuery, BudgetRow, RiverFlux, RowRiver, StatedRiver};
+use contract::ContractError;
+use contract::budget::{
+    AskedRiver, BudgetAnswer, BudgetQuery, BudgetRow, RiverFlux, RowRiver, StatedRiver,
+};
 use contract::manifest::Manifest;
 use contract::quantity::{Quantity, SECONDS_PER_YEAR};
 use contract::time::Period;
 
-use super::of_region::of_region;
+use super::measure::Measure;
+use super::over_region::{AskedArea, over_region};
+use super::rows::{RegionAreas, rows};
 use crate::summed::check_summed;
 use crate::{ComputeError, Engine};
 
 const MEANING: &str = "anthropogenic_tg is the budget less river_tg, the outgassing of carbon that rivers bring, positive out of the \
                        sea, over all of a row's time, also where the budget has gaps";
 
+/// From where on a coverage is shown as all of it, percent: of one decimal.
+const ALL_PERCENT: f64 = 99.95;
+
 /// What is taken off each row.
 pub(super) struct River {
     pub(super) basis: RiverFlux,
+    /// What of it may surprise, and is not said of the budget.
+    pub(super) notes: Vec<String>,
     /// Of each row, Tg.
     of_rows: Vec<f64>,
     /// Standard error of each, Tg; none if none was stated.
@@ -22,7 +32,7 @@ pub(super) struct River {
 }
 
 impl River {
-    /// The river flux of some rows.
+    /// The river flux of a budget's rows.
     ///
     /// # Errors
     /// A product that is no flux, or does not cover the time of a row.
@@ -30,8 +40,9 @@ impl River {
         engine: &Engine,
         query: &BudgetQuery,
         asked: &AskedRiver,
-        rows: &[BudgetRow],
+        budget: &BudgetAnswer,
     ) -> Result<Self, ComputeError> {
+        let rows = &budget.rows;
         match (&asked.stated, &asked.of_product) {
             (
                 StatedRiver::Rate {
@@ -41,7 +52,7 @@ impl River {
                 _,
             ) => Ok(Self::of_rate(asked, *tg_per_year, *sigma_tg_per_year, rows)),
             (StatedRiver::Product(_), Some(manifest)) => {
-                Self::of_product(engine, query, manifest, rows).await
+                Self::of_product(engine, query, manifest, budget).await
             }
             (StatedRiver::Product(product), None) => Err(ComputeError::inconsistent(
                 product.as_str(),
@@ -61,6 +72,7 @@ impl River {
                 manifest: None,
                 meaning: MEANING.to_owned(),
             },
+            notes: vec![],
             of_rows: rows.iter().map(|row| rate * years(row)).collect(),
             sigmas: sigma.map(|sigma| rows.iter().map(|row| sigma * years(row)).collect()),
         }
@@ -70,7 +82,7 @@ impl River {
         engine: &Engine,
         query: &BudgetQuery,
         manifest: &Manifest,
-        rows: &[BudgetRow],
+        budget: &BudgetAnswer,
     ) -> Result<Self, ComputeError> {
         if manifest.quantity != Quantity::CarbonFlux {
             return Err(ComputeError::NotAFlux {
@@ -79,55 +91,56 @@ impl River {
             });
         }
         check_summed(engine.store(), manifest).await?;
-        let (Some(first), Some(last)) = (rows.first(), rows.last()) else {
+        let of_budget = &budget.rows;
+        let (Some(first), Some(last)) = (of_budget.first(), of_budget.last()) else {
             return Err(ComputeError::inconsistent(
                 manifest.product.as_str(),
                 "no row",
             ));
         };
-        for row in rows {
-            if !covers(manifest, row) {
-                let covered = manifest
-                    .extent()
-                    .map_or("nothing".to_owned(), |own| own.to_string());
-                return Err(ComputeError::Uncertainty {
-                    reason: format!(
-                        "the river flux {} does not cover all of {}/{}: it covers {covered}; ask for a period that both have",
-                        manifest.product, row.start, row.end
-                    ),
-                });
-            }
+        if let Some(row) = of_budget.iter().find(|row| !covers(manifest, row)) {
+            let covered = manifest
+                .extent()
+                .map_or("nothing".to_owned(), |own| own.to_string());
+            let reason = format!(
+                "it does not cover all of {}/{}: it covers {covered}; ask for a period that both have",
+                row.start, row.end
+            );
+            let product = manifest.product.as_str();
+            return Err(ContractError::invalid("river flux", product, reason).into());
         }
-        let of_rivers = BudgetQuery {
-            product: manifest.product.clone(),
-            from: Some(first.start),
-            to: Some(last.end),
-            errors: None,
-            river: None,
-            parts: None,
-            ..query.clone()
+        let (_, steps) = manifest.steps_inside(Some(first.start), Some(last.end))?;
+        let area = AskedArea::of(query);
+        let over = over_region(engine, manifest, &steps, area, Measure::Mass).await?;
+        let asked = RegionAreas {
+            region_area_m2: over.extent.area_m2,
+            ocean_area_m2: over.extent.ocean_m2,
+            sea_steps: over.sums.sea_steps,
+            cells: query.cells,
         };
-        let answer = of_region(engine, &of_rivers, manifest).await?;
-        let same = |row: &BudgetRow| {
-            let mut own = answer.rows.iter();
-            own.find(|own| (own.start, own.end) == (row.start, row.end))
-                .map(|own| own.budget_tg)
-        };
-        let of_rows: Option<Vec<f64>> = rows.iter().map(same).collect();
+        // Of the very periods of the budget's rows: native ones are steps of its product, not of this one.
+        let periods: Vec<Period> = of_budget.iter().map(period).collect();
+        let own = rows(&periods, &over.sums.steps, &asked)
+            .filter(|own| own.len() == periods.len())
+            .ok_or_else(|| {
+                let what = manifest.id().to_string();
+                ComputeError::inconsistent(what, "its sums exceed 128 bits")
+            })?;
+        let mut notes = over.extent.notes;
+        // What is said of the region is said once.
+        notes.retain(|note| !budget.notes.contains(note));
+        notes.extend(beside_data(&own));
+        let named = |note: String| format!("river flux {}: {note}", manifest.product);
         Ok(Self {
-            of_rows: of_rows.ok_or_else(|| {
-                ComputeError::inconsistent(
-                    manifest.product.as_str(),
-                    "its rows are of other periods",
-                )
-            })?,
+            of_rows: own.iter().map(|row| row.budget_tg).collect(),
             basis: RiverFlux {
                 source: manifest.source.clone(),
                 tg_per_year: None,
                 sigma_tg_per_year: None,
-                manifest: Some(answer.manifest),
+                manifest: Some(manifest.id()),
                 meaning: MEANING.to_owned(),
             },
+            notes: notes.into_iter().map(named).collect(),
             sigmas: None,
         })
     }
@@ -148,12 +161,37 @@ impl River {
     }
 }
 
-/// Do steps lie in all of a row's time?
-fn covers(manifest: &Manifest, row: &BudgetRow) -> bool {
-    let period = Period {
+fn period(row: &BudgetRow) -> Period {
+    Period {
         start: row.start,
         end: row.end,
+    }
+}
+
+/// What is to be said of rows that do not hold data over all of the region's sea.
+fn beside_data(rows: &[BudgetRow]) -> Option<String> {
+    let of_sea = rows.iter().filter(|row| row.ocean_area_m2 > 0.0);
+    let percents = of_sea.map(|row| row.coverage_percent);
+    let (least, most) = (
+        percents.clone().reduce(f64::min)?,
+        percents.reduce(f64::max)?,
+    );
+    let (from, to) = (format!("{least:.1}"), format!("{most:.1}"));
+    let share = if from == to {
+        from
+    } else {
+        format!("{from} to {to}")
     };
+    (least < ALL_PERCENT).then(|| {
+        format!(
+            "its data cover {share} % of the region's sea: river_tg is of that part, and nothing is taken off for the rest"
+        )
+    })
+}
+
+/// Do steps lie in all of a row's time?
+fn covers(manifest: &Manifest, row: &BudgetRow) -> bool {
+    let period = period(row);
     let mut until = row.start;
     for step in manifest
         .steps

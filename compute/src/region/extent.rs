@@ -1,12 +1,13 @@
 //! How large a region is and how much of it is sea; what a reader should know of how it was taken.
 
-use contract::earth::Earth;
+use contract::earth::{Earth, WGS84_EQUATORIAL_RADIUS_M};
 use contract::region::{Polygon, Region};
 
 use super::area::signed_area_m2;
 use super::ring::Ring;
 use super::rings::rings;
 use super::sea::sea;
+use super::union::coarsest_step_deg;
 use crate::ComputeError;
 
 /// Edges wider than this may have been meant to go the other way round, degrees.
@@ -40,6 +41,34 @@ pub fn region_area_m2(region: &Region, earth: Earth) -> Result<f64, ComputeError
             .map(|ring| signed_area_m2(ring, earth))
             .sum()),
     }
+}
+
+/// By how much areas of polygons as they are written and of their union may differ since corners of the union are rounded, m²: the step of
+/// its lattice times the length of all outlines.
+pub(crate) fn rounding_m2(polygons: &[Polygon]) -> f64 {
+    let outlines = || {
+        polygons
+            .iter()
+            .flat_map(|polygon| std::iter::once(&polygon.outer).chain(&polygon.holes))
+    };
+    // Degrees of the equator.
+    let length_deg = |[from, to]: [[f64; 2]; 2]| {
+        let nearest_lat_deg = if from[1] * to[1] > 0.0 {
+            from[1].abs().min(to[1].abs())
+        } else {
+            0.0
+        };
+        let along_both_deg = (to[0] - from[0]).abs() + (to[1] - from[1]).abs();
+        along_both_deg * nearest_lat_deg.to_radians().cos()
+    };
+    let lengths_deg: f64 = outlines()
+        .map(|outline| {
+            let ring = Ring::new(outline.clone());
+            ring.edges().map(length_deg).sum::<f64>()
+        })
+        .sum();
+    let step_deg = coarsest_step_deg(outlines().flatten());
+    step_deg.to_radians() * lengths_deg.to_radians() * WGS84_EQUATORIAL_RADIUS_M.powi(2)
 }
 
 /// The extent of a region; its sea is what is no land of Natural Earth.

@@ -36,6 +36,11 @@ impl Lattice {
         }
     }
 
+    /// How far its points are apart, degrees.
+    pub(super) fn step_deg(&self) -> f64 {
+        self.points_per_deg.recip()
+    }
+
     /// The nearest points of a ring's corners.
     pub(super) fn contour(&self, corners: &[[f64; 2]]) -> IntContour {
         let number = |deg: f64, origin: f64| ((deg - origin) * self.points_per_deg).round() as i32;

@@ -5,7 +5,7 @@ use rstar::primitives::{GeomWithData, Rectangle};
 use rstar::{AABB, RTree, RTreeObject as _};
 
 use super::area::signed_area_m2;
-use super::cut::{bounds_deg, into_the_world};
+use super::cut::{WORLD_DEG, bounds_deg, into_the_world};
 use super::lattice::{Lattice, difference, edges};
 use super::ring::{Checked, Ring};
 
@@ -35,6 +35,15 @@ pub(super) fn united(polygons: &[Checked]) -> Vec<Ring> {
         }
     }
     rings
+}
+
+/// Step of the coarsest lattice that [`united`] brings corners to, of all polygons together or of any of them, degrees.
+pub(super) fn coarsest_step_deg<'a>(corners: impl IntoIterator<Item = &'a [f64; 2]>) -> f64 {
+    let [mut west, south, mut east, north] = bounds_deg(corners);
+    if east - west > 360.0 {
+        [west, east] = WORLD_DEG;
+    }
+    Lattice::over([west, south, east, north]).step_deg()
 }
 
 /// A polygon, perhaps in several parts: what outer rings go round less what holes go round.

@@ -8,6 +8,7 @@ use contract::grid::Grid;
 use contract::quantity::{Quantity, SECONDS_PER_YEAR};
 use contract::region::{AskedRegion, Region, named_regions};
 use contract::time::{Period, TimeMs, TimeStep};
+use storage::Store;
 
 use crate::fixture::{ONE_DEGREE, ask, folder_store, land, months, product, total, wavy_year};
 
@@ -179,6 +180,35 @@ async fn regions_sum_to_the_whole_with_what_they_share_and_leave_out() {
     }
 }
 
+/// Corners of regions that are added up are rounded by some millimetres, which along a wide box is more than a part in 10^9 of it.
+#[tokio::test(flavor = "multi_thread")]
+async fn rounded_corners_neither_reach_beyond_a_box_nor_leave_any_of_it_out() {
+    let (_folder, engine) = wavy().await;
+    let whole = "-142.4,16.4,-73.8,23";
+    let of = |squares: &[(&str, [f64; 4])]| BudgetQuery {
+        parts: Some(BudgetParts::Regions(regions(squares))),
+        ..total(&product("wavy"), whole)
+    };
+    let west = ("west", [-142.4, 16.4, -100.1, 23.0]);
+    let filling = [west, ("east", [-100.1, 16.4, -73.8, 23.0])];
+    let answer = ask(&engine, &of(&filling)).await;
+    let own = answer.closure.unwrap().regions.unwrap();
+    let wanted = "the regions fill the whole and do not overlap";
+    assert_eq!(own.summary, wanted);
+    let inside = ask(&engine, &of(&[west])).await;
+    let own = inside.closure.unwrap().regions.unwrap();
+    assert!(own.overlap_m2 <= 0.0 && own.left_out_m2 > 1e12);
+    // By 1e-4 degrees: 7.8 km2.
+    let beyond = [("beyond", [-100.1, 16.4, -73.7999, 23.0])];
+    let refused = budget(&engine, &of(&beyond)).await.unwrap_err();
+    assert!(refused.to_string().contains("reach 7."), "{refused}");
+    let gap = [west, ("east", [-100.0999, 16.4, -73.8, 23.0])];
+    let own = ask(&engine, &of(&gap)).await.closure.unwrap();
+    let own = own.regions.unwrap();
+    assert!((7e6..9e6).contains(&own.left_out_m2), "{}", own.summary);
+    assert!(own.summary.contains("leave 7."), "{}", own.summary);
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn every_code_of_a_mask_is_a_region() {
     let (_folder, store) = folder_store();
@@ -310,6 +340,84 @@ async fn a_river_flux_is_taken_off_by_the_length_of_rows() {
             .all(|row| row.river.unwrap().anthropogenic_tg.abs() < 1e-12)
     );
     let refused = budget(&engine, &of(stored, None)).await.unwrap_err();
-    let wanted = "does not cover all of 2000-07-01";
-    assert!(refused.to_string().contains(wanted), "{refused}");
+    let wanted = "river flux \"rivers\" is not valid: it does not cover all of 2000-07-01";
+    assert!(refused.to_string().starts_with(wanted), "{refused}");
+}
+
+/// Cells of 30 degrees.
+const COARSE: Grid = Grid {
+    rows: 6,
+    cols: 12,
+    dlat_deg: 30.0,
+    dlon_deg: 30.0,
+    ..ONE_DEGREE
+};
+
+/// A year's river flux as one step, of the cells that a rule of their columns takes.
+async fn yearly_rivers(store: &Store, has_data: impl Fn(usize) -> bool) -> AskedRiver {
+    let value = |cell: usize| if has_data(cell % 12) { 1e-10 } else { f32::NAN };
+    let values = (0..COARSE.cell_count()).map(value).collect();
+    let steps = [(Period::year(2000).unwrap(), values)];
+    let (id, flux) = (product("rivers"), Quantity::CarbonFlux);
+    let manifest = land(store, &id, flux, COARSE, &steps).await;
+    AskedRiver {
+        of_product: Some(Arc::new(manifest)),
+        ..river("rivers", None)
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn rivers_of_a_year_are_shared_out_to_the_steps_of_the_budget() {
+    let (_folder, store) = folder_store();
+    let (id, flux) = (product("wavy"), Quantity::CarbonFlux);
+    land(&store, &id, flux, COARSE, &wavy_year(&COARSE)).await;
+    let rivers = yearly_rivers(&store, |_| true).await;
+    let engine = Engine::local(store);
+    let query = BudgetQuery {
+        step: TimeStep::Native,
+        river: Some(rivers),
+        ..total(&id, "-60,-60,0,60")
+    };
+    let answer = ask(&engine, &query).await;
+    assert_eq!(answer.rows.len(), 12);
+    let year = ask(&engine, &total(&product("rivers"), "-60,-60,0,60")).await;
+    let year_tg = year.rows[0].budget_tg;
+    let river_tg = |at: usize| answer.rows[at].river.unwrap().river_tg;
+    let sum_tg: f64 = (0..12).map(river_tg).sum();
+    assert!((sum_tg / year_tg - 1.0).abs() < 1e-12, "{sum_tg} {year_tg}");
+    let january_tg = year_tg * 31.0 / 366.0;
+    assert!((river_tg(0) / january_tg - 1.0).abs() < 1e-9);
+    // Rivers that cover all of the sea are taken off without a word.
+    assert!(!answer.notes.iter().any(|note| note.contains("river flux")));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn rivers_of_a_part_of_the_sea_are_told_to_be_of_that_part() {
+    let (_folder, store) = folder_store();
+    let (id, flux) = (product("wavy"), Quantity::CarbonFlux);
+    land(&store, &id, flux, COARSE, &wavy_year(&COARSE)).await;
+    // East of 30 degrees west alone.
+    let rivers = yearly_rivers(&store, |col| col >= 5).await;
+    let engine = Engine::local(store);
+    let query = BudgetQuery {
+        river: Some(rivers),
+        ..total(&id, "-60,-60,0,60")
+    };
+    let answer = ask(&engine, &query).await;
+    let of_rivers = ask(&engine, &total(&product("rivers"), "-60,-60,0,60")).await;
+    let percent = of_rivers.rows[0].coverage_percent;
+    assert!((20.0..80.0).contains(&percent), "{percent}");
+    let wanted = format!("river flux rivers: its data cover {percent:.1} % of the region's sea");
+    let told = |note: &&String| note.starts_with(&wanted);
+    assert_eq!(
+        answer.notes.iter().filter(told).count(),
+        1,
+        "{:?}",
+        answer.notes
+    );
+    let (river_tg, of_part_tg) = (
+        answer.rows[0].river.unwrap().river_tg,
+        of_rivers.rows[0].budget_tg,
+    );
+    assert!((river_tg / of_part_tg - 1.0).abs() < 1e-12);
 }

@@ -1,11 +1,11 @@
 //! One budget over the versions of its product.
 
-use compute::budget::history;
-use compute::{Engine, ErrorClass};
+use compute::budget::{budget_of, history};
+use compute::{Engine, ErrorClass, derive_accumulated};
 use contract::budget::{AskedRiver, BudgetQuery, ErrorWords};
 use contract::grid::Grid;
 use contract::quantity::Quantity;
-use contract::time::{Period, TimeStep};
+use contract::time::{Period, TimeMs, TimeStep};
 use storage::Store;
 use storage::manifests::{self, AtInstant};
 
@@ -78,9 +78,7 @@ async fn each_version_that_changed_the_question_is_a_line() {
     assert!(found.versions.is_sorted_by_key(|own| own.published));
     for (at, own) in found.versions[..3].iter().enumerate() {
         let manifest = manifests::load(&store, &own.manifest).await.unwrap();
-        let answer = compute::budget::budget_of(&engine, &query, &manifest)
-            .await
-            .unwrap();
+        let answer = budget_of(&engine, &query, &manifest).await.unwrap();
         assert_eq!(own.budget_kg.as_ref(), Some(&answer.rows[0].budget_kg));
         assert_eq!(
             own.sigma_tg,
@@ -96,6 +94,50 @@ async fn each_version_that_changed_the_question_is_a_line() {
     assert_eq!((&last.budget_kg, last.difference_tg), (&None, None));
 }
 
+/// Both versions are of the same flux.
+#[tokio::test(flavor = "multi_thread")]
+async fn another_start_of_accumulated_carbon_is_a_line() {
+    let (_folder, store) = folder_store();
+    publish(&store, &[(1, 1e-9), (2, 2e-9), (3, 4e-9), (4, 8e-9)]).await;
+    let engine = Engine::local(store.clone());
+    let id = product("flux-accumulated");
+    let starts: [Option<TimeMs>; 2] = [None, Some("2000-02-11".parse().unwrap())];
+    let (flux, mut derived) = (product("flux"), vec![]);
+    for start in starts {
+        let version = derive_accumulated(&engine, &flux, start, &|_progress| ()).await;
+        derived.push(version.unwrap());
+    }
+    assert_eq!(derived[0].derived_from, derived[1].derived_from);
+    let query = total(&id, "0,-30,60,30");
+    let found = history(&engine, &query).await.unwrap();
+    let changed: Vec<_> = found
+        .versions
+        .iter()
+        .map(|own| own.changed.as_str())
+        .collect();
+    assert_eq!(
+        changed,
+        [
+            "first version that is kept, 4 steps",
+            "1 steps removed, accumulated from 2000-02-11T00:00:00Z"
+        ]
+    );
+    for (own, manifest) in found.versions.iter().zip(&derived) {
+        let answer = budget_of(&engine, &query, manifest).await.unwrap();
+        assert_eq!(own.manifest, manifest.id());
+        assert_eq!(own.budget_kg.as_ref(), Some(&answer.rows[0].budget_kg));
+    }
+    assert_ne!(found.versions[0].budget_kg, found.versions[1].budget_kg);
+
+    // Where both have begun neither start is a matter of the question.
+    let later = BudgetQuery {
+        from: Some("2000-03".parse().unwrap()),
+        ..query
+    };
+    let found = history(&engine, &later).await.unwrap();
+    assert_eq!(found.versions.len(), 1);
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn a_version_is_found_by_when_it_was_published() {
     let (_folder, store) = folder_store();
@@ -109,7 +151,7 @@ async fn a_version_is_found_by_when_it_was_published() {
     };
     assert!(first < second);
     let at = async |ms: i64| {
-        let instant = contract::time::TimeMs::new(ms).unwrap();
+        let instant = TimeMs::new(ms).unwrap();
         manifests::as_of(&store, &id, instant).await.unwrap()
     };
     for (ms, number) in [
@@ -166,6 +208,24 @@ async fn what_has_no_history_is_refused() {
         .await
         .unwrap_err();
     assert_eq!(unknown.class(), ErrorClass::NotFound);
+    let turned = BudgetQuery {
+        from: Some("2001".parse().unwrap()),
+        to: Some("2000".parse().unwrap()),
+        ..total(&product("flux"), "global")
+    };
+    let refused = history(&engine, &turned).await.unwrap_err();
+    assert!(refused.to_string().contains("after the start"), "{refused}");
+    let steps = [(
+        Period::month(2000, 1).unwrap(),
+        vec![290.0; GRID.cell_count()],
+    )];
+    let (id, sst) = (product("sst"), Quantity::SeaSurfaceTemperature);
+    land(engine.store(), &id, sst, GRID, &steps).await;
+    let refused = history(&engine, &total(&id, "global")).await.unwrap_err();
+    assert!(
+        refused.to_string().contains("no flux of carbon"),
+        "{refused}"
+    );
     let globe = ask(&engine, &total(&product("flux"), "global")).await;
     assert!(globe.uncertainty.is_none());
 }
