@@ -35,7 +35,9 @@ use matched::{Input, Matched, Matches};
 pub use request::{Request, RequestedInput};
 
 /// Version of the way products are computed: it changes when their bits do.
-const METHOD: u32 = 1;
+///
+/// 2: rounding takes no column from a globe that is brought to another grid.
+const METHOD: u32 = 2;
 /// Values that a task looks through for the cells that hold data: 256 MiB of f32, whatever the grid.
 const RUN_VALUES: usize = 64 << 20;
 /// Steps that it looks through at the least: what it finds is a byte a cell in the store until clean-up.
