@@ -36,7 +36,7 @@ pub use request::{Request, RequestedInput};
 
 /// Version of the way products are computed: it changes when their bits do.
 ///
-/// 2: rounding takes no column from a globe that is brought to another grid.
+/// 2: rounding takes no column from a globe that is brought to another grid; no comparison with what is no number is true.
 const METHOD: u32 = 2;
 /// Values that a task looks through for the cells that hold data: 256 MiB of f32, whatever the grid.
 const RUN_VALUES: usize = 64 << 20;
