@@ -159,7 +159,7 @@ impl Plan {
             ..
         } = request.how
         {
-            check_averaged(first)?;
+            check_averaged(engine.store(), first).await?;
         }
         let title = match &request.title {
             Some(title) => title.clone(),
