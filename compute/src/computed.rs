@@ -15,7 +15,7 @@ mod work;
 
 use std::collections::BTreeMap;
 
-use contract::computed::{Computation, Computed, ComputedInput, Regridding};
+use contract::computed::{Computation, Computed, ComputedInput};
 use contract::digest::Digest;
 use contract::grid::Grid;
 use contract::manifest::{MANIFEST_SCHEMA, Manifest, Step};
@@ -27,7 +27,7 @@ use storage::{domain, manifests};
 use crate::expression::unit::Scaled;
 use crate::functions::{COMPUTED_EXTENT, COMPUTED_FIELD};
 use crate::publish::{IsStillAsked, check_asked, publish_if};
-use crate::summed::check_averaged;
+use crate::summed::check_regridded;
 use crate::{ComputeError, DeriveProgress, Engine, catalogue};
 use job::{ExtentMade, ExtentTask, FieldMade, FieldTask, Job};
 use make::Maker;
@@ -154,12 +154,8 @@ impl Plan {
         check(&job)?;
         matched::pressures_of_a_kind(&inputs, &request.how)?;
         matched::places_of_a_kind(&inputs)?;
-        if let Computation::Regrid {
-            method: Regridding::Bilinear | Regridding::Conservative,
-            ..
-        } = request.how
-        {
-            check_averaged(engine.store(), first).await?;
+        if let Computation::Regrid { method, .. } = request.how {
+            check_regridded(engine.store(), first, method).await?;
         }
         let title = match &request.title {
             Some(title) => title.clone(),

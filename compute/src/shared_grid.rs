@@ -1,10 +1,10 @@
 //! Whether two products lie on one grid, and what brings one to that of the other.
 
-use contract::computed::Regridding;
 use contract::grid::Grid;
 use contract::manifest::Manifest;
 
 use crate::ComputeError;
+use crate::summed::usual_regridding;
 
 /// Do both lie on one grid, so that a cell of one is that cell of the other?
 ///
@@ -20,7 +20,7 @@ pub(crate) fn check(first: &Manifest, second: &Manifest) -> Result<(), ComputeEr
          fluxglobe derive regrid --product {others} --like {own} --method {}",
         in_words(&first.grid),
         in_words(&second.grid),
-        Regridding::Conservative,
+        usual_regridding(second),
     );
     Err(ComputeError::Expression { reason })
 }

@@ -1,10 +1,11 @@
-//! What may be summed over area and time, a flux of carbon and no extreme of one; and what may be averaged, no days of a year that goes round.
+//! What may be summed over area and time, a flux of carbon and no extreme of one; and what may be averaged, no days of a year that goes round
+//! and, on the way to another grid, no codes.
 
 use std::collections::BTreeSet;
 
 use contract::ContractError;
 use contract::analysis::MapStatistic;
-use contract::computed::{Computation, Computed};
+use contract::computed::{Computation, Computed, Regridding};
 use contract::manifest::Manifest;
 use contract::quantity::Quantity;
 use contract::statistics::Percentile;
@@ -69,6 +70,43 @@ pub(crate) async fn check_averaged(store: &Store, manifest: &Manifest) -> Result
     let reason = "it holds days of the year, which go round: the mean of 1 January and 31 December is no day in July; ask for single places";
     let refused = ContractError::invalid("product", manifest.product.as_str(), reason);
     Err(refused.into())
+}
+
+/// # Errors
+/// Of what no mean is to be taken, unless each cell has the value of one: codes of a mask, whose mean is another code, and what
+/// [`check_averaged`] refuses.
+pub(crate) async fn check_regridded(
+    store: &Store,
+    manifest: &Manifest,
+    method: Regridding,
+) -> Result<(), ComputeError> {
+    match method {
+        Regridding::Nearest => Ok(()),
+        Regridding::Bilinear | Regridding::Conservative if holds_codes(manifest) => {
+            let reason = format!(
+                "{} holds codes, and the mean of two is the code of something else: bring it to another grid with --method {}",
+                manifest.product,
+                Regridding::Nearest,
+            );
+            Err(ComputeError::Expression { reason })
+        }
+        Regridding::Bilinear | Regridding::Conservative => check_averaged(store, manifest).await,
+    }
+}
+
+/// The method that brings a product to another grid with all that it holds: by means, or where there are none by single cells.
+pub(crate) fn usual_regridding(manifest: &Manifest) -> Regridding {
+    let computed = manifest.computed.as_ref();
+    let statistic = computed.and_then(|computed| computed.how.statistic());
+    if holds_codes(manifest) || statistic == Some(MapStatistic::Phase) {
+        Regridding::Nearest
+    } else {
+        Regridding::Conservative
+    }
+}
+
+fn holds_codes(manifest: &Manifest) -> bool {
+    !manifest.quantity.flags().is_empty()
 }
 
 /// How a version was computed, and before it what it was made of, as long as each `keeps` what that holds; its own computation is the first.
