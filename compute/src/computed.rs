@@ -5,6 +5,7 @@
 //! those of the newest version that still are what they would be are kept.
 
 pub mod co2_flux;
+mod fits;
 pub(crate) mod job;
 mod lineage;
 pub(crate) mod make;
@@ -17,20 +18,17 @@ use std::collections::BTreeMap;
 
 use contract::computed::{Computation, Computed, ComputedInput};
 use contract::digest::Digest;
-use contract::grid::Grid;
 use contract::manifest::{MANIFEST_SCHEMA, Manifest, Step};
 use contract::masked::MaskedCells;
 use futures::future::BoxFuture;
 use storage::domain::Cells;
 use storage::{domain, manifests};
 
-use crate::expression::unit::Scaled;
 use crate::functions::{COMPUTED_EXTENT, COMPUTED_FIELD};
 use crate::publish::{IsStillAsked, check_asked, publish_if};
 use crate::summed::check_regridded;
 use crate::{ComputeError, DeriveProgress, Engine, catalogue};
 use job::{ExtentMade, ExtentTask, FieldMade, FieldTask, Job};
-use make::Maker;
 use matched::{Input, Matched, Matches};
 pub use request::{Request, RequestedInput};
 
@@ -86,7 +84,7 @@ pub(crate) fn compute_if<'a>(
         let latest = manifests::latest(engine.store(), &request.target).await?;
         check_asked((&request.target, latest.as_ref()), is_still_asked)?;
         if let Some(latest) = &latest {
-            fits_what_is_there(latest, &plan.job)?;
+            fits::what_is_there(latest, request, &plan.job)?;
             // Nothing was made of what is not there.
             let inputs = plan.inputs.iter().map(|input| &input.manifest);
             lineage::check(engine.store(), &request.target, inputs).await?;
@@ -151,7 +149,7 @@ impl Plan {
             target: request.target.clone(),
             quantity: request.quantity.unwrap_or(first.quantity),
         };
-        check(&job)?;
+        fits::check(&job)?;
         matched::pressures_of_a_kind(&inputs, &request.how)?;
         matched::places_of_a_kind(&inputs)?;
         if let Computation::Regrid { method, .. } = request.how {
@@ -324,70 +322,6 @@ fn named_unit(input: &Input) -> (String, String) {
         input.name.clone(),
         input.manifest.quantity.unit().to_owned(),
     )
-}
-
-/// Whether an expression can be read, over units that can be, and comes to the unit of its quantity; and whether grids meet.
-fn check(job: &Job) -> Result<(), ComputeError> {
-    let refused = |reason| Err(ComputeError::Expression { reason });
-    match Maker::of(job)? {
-        Maker::Expression(expression) => {
-            let (unit, wanted) = (expression.unit(), job.quantity.unit());
-            if Scaled::kept(wanted).map(|scaled| scaled.unit) != Some(unit) {
-                return refused(format!(
-                    "the expression comes to {unit}, but {} is stored in {wanted}",
-                    job.quantity.word()
-                ));
-            }
-            let shape = |grid: &Grid| (grid.rows, grid.cols);
-            if shape(&job.grid) != shape(&job.target_grid) {
-                return refused("an expression has the grid of its inputs".to_owned());
-            }
-            Ok(())
-        }
-        Maker::Regrid {
-            regridder,
-            min_coverage,
-        } => {
-            if job.inputs.len() != 1 {
-                return refused("one product is brought to another grid at a time".to_owned());
-            }
-            if !(0.0..=1.0).contains(&min_coverage) {
-                return refused(format!("a share of a cell is 0 to 1, not {min_coverage}"));
-            }
-            job.target_grid.validate()?;
-            if !regridder.touches() {
-                return refused("the two grids have no place in common".to_owned());
-            }
-            Ok(())
-        }
-    }
-}
-
-/// What is there under the name must be of the same kind.
-fn fits_what_is_there(latest: &Manifest, job: &Job) -> Result<(), ComputeError> {
-    let refused = |reason| Err(ComputeError::Expression { reason });
-    let product = &latest.product;
-    if !latest
-        .computed
-        .as_ref()
-        .is_some_and(|it| it.how.is_by_step())
-    {
-        return refused(format!(
-            "{product} is there and was not computed; give another name"
-        ));
-    }
-    if latest.grid != job.target_grid {
-        return refused(format!(
-            "{product} is there on another grid; give another name"
-        ));
-    }
-    if latest.quantity.unit() != job.quantity.unit() {
-        return refused(format!(
-            "{product} is there and holds {}; give another name",
-            latest.quantity.word()
-        ));
-    }
-    Ok(())
 }
 
 /// Steps of the newest version that are what they would be.

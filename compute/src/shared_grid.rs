@@ -26,7 +26,7 @@ pub(crate) fn check(first: &Manifest, second: &Manifest) -> Result<(), ComputeEr
 }
 
 /// Are two grids the same but for the noise of their axes?
-fn is_same(a: &Grid, b: &Grid) -> bool {
+pub(crate) fn is_same(a: &Grid, b: &Grid) -> bool {
     /// Share of a cell: axes of files are written with five digits and more.
     const SLACK_CELLS: f64 = 1e-3;
     let near = |a: f64, b: f64, step: f64| (a - b).abs() < SLACK_CELLS * step;

@@ -337,6 +337,44 @@ async fn a_flux_has_its_carbon_accumulated_and_statistics_of_that_follow() {
     );
 }
 
+/// As when files are read anew whose axes were taken for half a cell off.
+#[tokio::test(flavor = "multi_thread")]
+async fn an_expression_goes_where_its_inputs_went_and_stays_while_they_have_parted() {
+    let (_folder, store) = folder_store();
+    for name in ["sst", "other"] {
+        landed(&store, name, 12, 1).await;
+    }
+    let engine = Engine::in_process(store.clone(), parts(2));
+    computed(&engine, &expression("twice", "2 * sst", &["sst"])).await;
+    let sum = expression("sum", "sst + other", &["sst", "other"]);
+    computed(&engine, &sum).await;
+    let moved = Grid {
+        north_deg: GRID.north_deg - 0.5,
+        west_deg: GRID.west_deg + 0.5,
+        ..GRID
+    };
+    let land_moved = async |name: &str| {
+        let (name, steps) = (product(name), months(12, 1));
+        land(&store, &name, Quantity::WindSpeed, moved, &steps).await
+    };
+    let made = |name: &str| [(name.to_owned(), 2)];
+    land_moved("sst").await;
+    assert_eq!(followed(&engine, "sst").await, made("twice"));
+    assert_eq!(latest(&store, "twice").await.grid, moved);
+    let left = latest(&store, "sum").await;
+    assert_eq!((left.number, left.grid), (1, GRID));
+    land_moved("other").await;
+    assert_eq!(followed(&engine, "other").await, made("sum"));
+    assert_eq!(latest(&store, "sum").await.grid, moved);
+    // Whoever asks for it gets the same; something else under its name is refused where grids differ.
+    assert_eq!(computed(&engine, &sum).await.number, 2);
+    landed(&store, "sst", 12, 1).await;
+    let other = expression("twice", "3 * sst", &["sst"]);
+    let refused = compute(&engine, &other, &|_| ()).await.unwrap_err();
+    let refused = refused.to_string();
+    assert!(refused.contains("on another grid"), "{refused}");
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn a_newer_version_of_the_same_steps_is_said_and_not_computed() {
     let (_folder, store) = folder_store();
