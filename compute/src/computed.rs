@@ -20,6 +20,7 @@ use contract::computed::{Computation, Computed, ComputedInput};
 use contract::digest::Digest;
 use contract::manifest::{MANIFEST_SCHEMA, Manifest, Step};
 use contract::masked::MaskedCells;
+use contract::quantity::Quantity;
 use futures::future::BoxFuture;
 use storage::domain::Cells;
 use storage::{domain, manifests};
@@ -162,7 +163,7 @@ impl Plan {
         };
         Ok(Self {
             matches: matched::steps(&inputs, (request.from, request.to))?,
-            computation: Digest::of_json(&(METHOD, &job)),
+            computation: computation(&job)?,
             inputs,
             job,
             title,
@@ -178,6 +179,7 @@ impl Plan {
         kept.len() == self.matches.steps.len()
             && latest.steps.len() == kept.len()
             && latest.title == self.title
+            && latest.quantity == self.job.quantity
             && latest.computed.as_ref() == Some(&self.computed(request))
     }
 
@@ -304,6 +306,19 @@ impl Plan {
     }
 }
 
+/// The name of a computation: of all that values hang on. Of a quantity that is its kind, and not the range that grows with every landing.
+fn computation(job: &Job) -> Result<Digest, ComputeError> {
+    let quantity = match job.quantity {
+        open @ Quantity::Open(_) => Quantity::open(open.word(), open.unit(), open.word())?,
+        known => known,
+    };
+    let job = Job {
+        quantity,
+        ..job.clone()
+    };
+    Ok(Digest::of_json(&(METHOD, job)))
+}
+
 /// What a step is made of, for people, and where functions were called outside the range of their papers.
 fn origin(step: &Matched, outside: &BTreeMap<String, u64>) -> String {
     let counts = outside
@@ -326,7 +341,8 @@ fn named_unit(input: &Input) -> (String, String) {
 
 /// Steps of the newest version that are what they would be.
 fn kept(plan: &Plan, latest: Option<&Manifest>) -> BTreeMap<usize, Step> {
-    let Some(latest) = latest.filter(|latest| latest.quantity == plan.job.quantity) else {
+    let is_of_kind = |latest: &&Manifest| latest.quantity.is_same_kind(plan.job.quantity);
+    let Some(latest) = latest.filter(is_of_kind) else {
         return BTreeMap::new();
     };
     let there: BTreeMap<Digest, &Step> = latest

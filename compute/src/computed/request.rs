@@ -29,8 +29,8 @@ pub struct Request {
 }
 
 impl Request {
-    /// The request that a computed version was made by; none of what was made in another way. An expression has the
-    /// grid that its inputs have now.
+    /// The request that a computed version was made by; none of what was made in another way. What it has of its inputs is what
+    /// they have now: an expression their grid, what is brought to another grid its quantity.
     pub(crate) fn of(manifest: &Manifest) -> Option<Self> {
         let computed = manifest.computed.as_ref();
         let computed = computed.filter(|it| it.how.is_by_step())?;
@@ -43,7 +43,7 @@ impl Request {
         Some(Self {
             target: manifest.product.clone(),
             title: Some(manifest.title.clone()),
-            quantity: Some(manifest.quantity),
+            quantity: (!is_regridded).then_some(manifest.quantity),
             how: computed.how.clone(),
             grid: is_regridded.then_some(manifest.grid),
             inputs: computed.inputs.iter().map(input).collect(),

@@ -318,6 +318,42 @@ async fn what_makes_no_sense_is_refused_before_anything_is_stored() {
     );
 }
 
+#[tokio::test(flavor = "multi_thread")]
+async fn what_is_brought_to_another_grid_holds_what_its_source_holds_now_and_keeps_its_steps() {
+    let (_folder, store) = folder_store();
+    let engine = Engine::in_process(store.clone(), parts(2));
+    let year = wavy_year(&ONE_DEGREE);
+    let plain = Quantity::open("uptake", "1", "Uptake").unwrap();
+    let [narrow, wide] = [[0.0, 1.0], [-5.0, 9.0]].map(|range| plain.over(range).unwrap());
+    let source = product("source");
+    land(&store, &source, narrow, ONE_DEGREE, &year[..10]).await;
+    let request = Request {
+        target: product("coarse"),
+        quantity: None,
+        how: Computation::Regrid {
+            method: Regridding::Nearest,
+            min_coverage: 0.5,
+        },
+        grid: Some(FOUR_DEGREES),
+        ..asked("", &["source"])
+    };
+    let first = computed(&engine, &request).await.manifest;
+    assert_eq!(first.quantity, narrow);
+    // The range of a quantity grows with what lands.
+    land(&store, &source, wide, ONE_DEGREE, &year).await;
+    let outcome = computed(&engine, &request).await;
+    let second = &outcome.manifest;
+    assert_eq!((second.number, second.quantity), (2, wide));
+    assert_eq!((outcome.kept_count, second.steps.len()), (10, 12));
+    assert_eq!(second.steps[..10], first.steps);
+    // It was taken for something else, and its files are read anew.
+    land(&store, &source, Quantity::IceFraction, ONE_DEGREE, &year).await;
+    let made = compute::dependents::follow(&engine, &source).await.unwrap();
+    assert_eq!(made.len(), 1);
+    assert_eq!(made[0].quantity, Quantity::IceFraction);
+    assert_eq!(made[0].number, 3);
+}
+
 /// Between sea (0) and land (2) there is no coast (1).
 #[tokio::test(flavor = "multi_thread")]
 async fn codes_are_brought_to_another_grid_by_the_nearest_alone() {
