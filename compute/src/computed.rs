@@ -26,7 +26,7 @@ use storage::domain::Cells;
 use storage::{domain, manifests};
 
 use crate::functions::{COMPUTED_EXTENT, COMPUTED_FIELD};
-use crate::publish::{IsStillAsked, check_asked, publish_if};
+use crate::publish::{IsStillAsked, MADE_AGAIN, check_asked, publish_if};
 use crate::summed::check_regridded;
 use crate::{ComputeError, DeriveProgress, Engine, catalogue};
 use job::{ExtentMade, ExtentTask, FieldMade, FieldTask, Job};
@@ -58,7 +58,8 @@ pub struct Outcome {
     pub outside: BTreeMap<String, u64>,
 }
 
-/// Computes a product and lands it. Nothing is changed if the newest version is what would come out.
+/// Computes a product and lands it. Nothing is changed if the newest version is what would come out, or that of newer inputs, which
+/// was asked for alike.
 ///
 /// # Errors
 /// [`ComputeError::Expression`] where it makes no sense as it is asked for: mixed units, other grids, no common period.
@@ -67,7 +68,16 @@ pub fn compute<'a>(
     request: &'a Request,
     progress: &'a (dyn Fn(DeriveProgress) + Send + Sync),
 ) -> BoxFuture<'a, Result<Outcome, ComputeError>> {
-    compute_if(engine, request, None, progress)
+    Box::pin(async move {
+        for _ in 1..MADE_AGAIN {
+            match compute_if(engine, request, None, progress).await {
+                // It was brought up to date meanwhile, as it was asked for before.
+                Err(ComputeError::AskedOtherwise { .. }) => {}
+                computed => return computed,
+            }
+        }
+        compute_if(engine, request, None, progress).await
+    })
 }
 
 /// The same, landed only if the newest version of the product still asks for it.
