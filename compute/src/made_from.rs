@@ -22,7 +22,7 @@ fn is_by_step(manifest: &Manifest) -> bool {
 }
 
 /// The versions that anything was made from.
-fn inputs(manifest: &Manifest) -> Vec<&ManifestId> {
+pub(crate) fn inputs(manifest: &Manifest) -> Vec<&ManifestId> {
     match &manifest.computed {
         None => manifest.derived_from.iter().collect(),
         Some(computed) => computed.inputs.iter().map(|it| &it.manifest).collect(),
