@@ -5,6 +5,7 @@
 //! those of the newest version that still are what they would be are kept.
 
 pub mod co2_flux;
+mod fits;
 pub(crate) mod job;
 mod lineage;
 pub(crate) mod make;
@@ -15,27 +16,27 @@ mod work;
 
 use std::collections::BTreeMap;
 
-use contract::computed::{Computation, Computed, ComputedInput, Regridding};
+use contract::computed::{Computation, Computed, ComputedInput};
 use contract::digest::Digest;
-use contract::grid::Grid;
 use contract::manifest::{MANIFEST_SCHEMA, Manifest, Step};
 use contract::masked::MaskedCells;
+use contract::quantity::Quantity;
 use futures::future::BoxFuture;
 use storage::domain::Cells;
 use storage::{domain, manifests};
 
-use crate::expression::unit::Scaled;
 use crate::functions::{COMPUTED_EXTENT, COMPUTED_FIELD};
-use crate::publish::{IsStillAsked, check_asked, publish_if};
-use crate::summed::check_averaged;
+use crate::publish::{IsStillAsked, MADE_AGAIN, check_asked, publish_if};
+use crate::summed::check_regridded;
 use crate::{ComputeError, DeriveProgress, Engine, catalogue};
 use job::{ExtentMade, ExtentTask, FieldMade, FieldTask, Job};
-use make::Maker;
 use matched::{Input, Matched, Matches};
 pub use request::{Request, RequestedInput};
 
 /// Version of the way products are computed: it changes when their bits do.
-const METHOD: u32 = 1;
+///
+/// 2: rounding takes no column from a globe that is brought to another grid; no comparison with what is no number is true.
+const METHOD: u32 = 2;
 /// Values that a task looks through for the cells that hold data: 256 MiB of f32, whatever the grid.
 const RUN_VALUES: usize = 64 << 20;
 /// Steps that it looks through at the least: what it finds is a byte a cell in the store until clean-up.
@@ -57,7 +58,8 @@ pub struct Outcome {
     pub outside: BTreeMap<String, u64>,
 }
 
-/// Computes a product and lands it. Nothing is changed if the newest version is what would come out.
+/// Computes a product and lands it. Nothing is changed if the newest version is what would come out, or that of newer inputs, which
+/// was asked for alike.
 ///
 /// # Errors
 /// [`ComputeError::Expression`] where it makes no sense as it is asked for: mixed units, other grids, no common period.
@@ -66,7 +68,16 @@ pub fn compute<'a>(
     request: &'a Request,
     progress: &'a (dyn Fn(DeriveProgress) + Send + Sync),
 ) -> BoxFuture<'a, Result<Outcome, ComputeError>> {
-    compute_if(engine, request, None, progress)
+    Box::pin(async move {
+        for _ in 1..MADE_AGAIN {
+            match compute_if(engine, request, None, progress).await {
+                // It was brought up to date meanwhile, as it was asked for before.
+                Err(ComputeError::AskedOtherwise { .. }) => {}
+                computed => return computed,
+            }
+        }
+        compute_if(engine, request, None, progress).await
+    })
 }
 
 /// The same, landed only if the newest version of the product still asks for it.
@@ -84,7 +95,7 @@ pub(crate) fn compute_if<'a>(
         let latest = manifests::latest(engine.store(), &request.target).await?;
         check_asked((&request.target, latest.as_ref()), is_still_asked)?;
         if let Some(latest) = &latest {
-            fits_what_is_there(latest, &plan.job)?;
+            fits::what_is_there(latest, request, &plan.job)?;
             // Nothing was made of what is not there.
             let inputs = plan.inputs.iter().map(|input| &input.manifest);
             lineage::check(engine.store(), &request.target, inputs).await?;
@@ -149,15 +160,11 @@ impl Plan {
             target: request.target.clone(),
             quantity: request.quantity.unwrap_or(first.quantity),
         };
-        check(&job)?;
+        fits::check(&job)?;
         matched::pressures_of_a_kind(&inputs, &request.how)?;
         matched::places_of_a_kind(&inputs)?;
-        if let Computation::Regrid {
-            method: Regridding::Bilinear | Regridding::Conservative,
-            ..
-        } = request.how
-        {
-            check_averaged(first)?;
+        if let Computation::Regrid { method, .. } = request.how {
+            check_regridded(engine.store(), first, method).await?;
         }
         let title = match &request.title {
             Some(title) => title.clone(),
@@ -166,7 +173,7 @@ impl Plan {
         };
         Ok(Self {
             matches: matched::steps(&inputs, (request.from, request.to))?,
-            computation: Digest::of_json(&(METHOD, &job)),
+            computation: computation(&job)?,
             inputs,
             job,
             title,
@@ -182,6 +189,7 @@ impl Plan {
         kept.len() == self.matches.steps.len()
             && latest.steps.len() == kept.len()
             && latest.title == self.title
+            && latest.quantity == self.job.quantity
             && latest.computed.as_ref() == Some(&self.computed(request))
     }
 
@@ -308,6 +316,19 @@ impl Plan {
     }
 }
 
+/// The name of a computation: of all that values hang on. Of a quantity that is its kind, and not the range that grows with every landing.
+fn computation(job: &Job) -> Result<Digest, ComputeError> {
+    let quantity = match job.quantity {
+        open @ Quantity::Open(_) => Quantity::open(open.word(), open.unit(), open.word())?,
+        known => known,
+    };
+    let job = Job {
+        quantity,
+        ..job.clone()
+    };
+    Ok(Digest::of_json(&(METHOD, job)))
+}
+
 /// What a step is made of, for people, and where functions were called outside the range of their papers.
 fn origin(step: &Matched, outside: &BTreeMap<String, u64>) -> String {
     let counts = outside
@@ -328,73 +349,10 @@ fn named_unit(input: &Input) -> (String, String) {
     )
 }
 
-/// Whether an expression can be read, over units that can be, and comes to the unit of its quantity; and whether grids meet.
-fn check(job: &Job) -> Result<(), ComputeError> {
-    let refused = |reason| Err(ComputeError::Expression { reason });
-    match Maker::of(job)? {
-        Maker::Expression(expression) => {
-            let (unit, wanted) = (expression.unit(), job.quantity.unit());
-            if Scaled::kept(wanted).map(|scaled| scaled.unit) != Some(unit) {
-                return refused(format!(
-                    "the expression comes to {unit}, but {} is stored in {wanted}",
-                    job.quantity.word()
-                ));
-            }
-            let shape = |grid: &Grid| (grid.rows, grid.cols);
-            if shape(&job.grid) != shape(&job.target_grid) {
-                return refused("an expression has the grid of its inputs".to_owned());
-            }
-            Ok(())
-        }
-        Maker::Regrid {
-            regridder,
-            min_coverage,
-        } => {
-            if job.inputs.len() != 1 {
-                return refused("one product is brought to another grid at a time".to_owned());
-            }
-            if !(0.0..=1.0).contains(&min_coverage) {
-                return refused(format!("a share of a cell is 0 to 1, not {min_coverage}"));
-            }
-            job.target_grid.validate()?;
-            if !regridder.touches() {
-                return refused("the two grids have no place in common".to_owned());
-            }
-            Ok(())
-        }
-    }
-}
-
-/// What is there under the name must be of the same kind.
-fn fits_what_is_there(latest: &Manifest, job: &Job) -> Result<(), ComputeError> {
-    let refused = |reason| Err(ComputeError::Expression { reason });
-    let product = &latest.product;
-    if !latest
-        .computed
-        .as_ref()
-        .is_some_and(|it| it.how.is_by_step())
-    {
-        return refused(format!(
-            "{product} is there and was not computed; give another name"
-        ));
-    }
-    if latest.grid != job.target_grid {
-        return refused(format!(
-            "{product} is there on another grid; give another name"
-        ));
-    }
-    if latest.quantity.unit() != job.quantity.unit() {
-        return refused(format!(
-            "{product} is there and holds {}; give another name",
-            latest.quantity.word()
-        ));
-    }
-    Ok(())
-}
-
 /// Steps of the newest version that are what they would be.
 fn kept(plan: &Plan, latest: Option<&Manifest>) -> BTreeMap<usize, Step> {
-    let Some(latest) = latest.filter(|latest| latest.quantity == plan.job.quantity) else {
+    let is_of_kind = |latest: &&Manifest| latest.quantity.is_same_kind(plan.job.quantity);
+    let Some(latest) = latest.filter(is_of_kind) else {
         return BTreeMap::new();
     };
     let there: BTreeMap<Digest, &Step> = latest

@@ -4,6 +4,7 @@
 //! How each is made its own newest manifest says. One that cannot be made any more (its inputs have parted) is told of and left
 //! as it is.
 
+mod behind;
 mod order;
 mod recipe;
 
@@ -21,6 +22,7 @@ use crate::derive::{
 use crate::publish::{IsStillAsked, MADE_AGAIN, first_instant};
 use crate::summed::has_budget;
 use crate::{ComputeError, Engine, catalogue};
+pub use behind::behind;
 use order::Order;
 use recipe::Recipe;
 pub use recipe::why_it_stays;

@@ -9,16 +9,32 @@ use crate::ComputeError;
 
 /// The version that something was accumulated or a statistic made from, both of what is of two; none of anything else.
 pub(crate) fn made_from(manifest: &Manifest) -> Vec<&ManifestId> {
+    if is_by_step(manifest) {
+        vec![]
+    } else {
+        inputs(manifest)
+    }
+}
+
+fn is_by_step(manifest: &Manifest) -> bool {
+    let computed = manifest.computed.as_ref();
+    computed.is_some_and(|computed| computed.how.is_by_step())
+}
+
+/// The versions that anything was made from.
+pub(crate) fn inputs(manifest: &Manifest) -> Vec<&ManifestId> {
     match &manifest.computed {
         None => manifest.derived_from.iter().collect(),
-        Some(computed) if computed.how.is_by_step() => vec![],
         Some(computed) => computed.inputs.iter().map(|it| &it.manifest).collect(),
     }
 }
 
-/// Was one version made from newer versions than another of the same products, and from none that is older?
+/// Was one version made from newer versions than another of the same products, and from none that is older? Both step by step, or neither.
 pub(crate) fn is_from_newer(latest: &Manifest, derived: &Manifest) -> bool {
-    let (theirs, own) = (made_from(latest), made_from(derived));
+    if is_by_step(latest) != is_by_step(derived) {
+        return false;
+    }
+    let (theirs, own) = (inputs(latest), inputs(derived));
     let is_of_same = theirs.iter().map(|id| &id.product);
     let is_of_same = is_of_same.eq(own.iter().map(|id| &id.product));
     let numbers = || theirs.iter().zip(&own).map(|(a, b)| (a.number, b.number));
@@ -131,8 +147,19 @@ mod tests {
         ] {
             assert_eq!(is_from_newer(&of(numbers), &own), is_newer, "{numbers:?}");
         }
-        let expression = "first + second".to_owned();
-        let by_step = made([9, 9], Computation::Expression { expression });
-        assert!(made_from(&by_step).is_empty() && !is_from_newer(&by_step, &own));
+        // What is made step by step is compared with its like alone.
+        let by_step = |numbers| {
+            let expression = "first + second".to_owned();
+            made(numbers, Computation::Expression { expression })
+        };
+        let newer = by_step([9, 9]);
+        assert!(made_from(&newer).is_empty() && !is_from_newer(&newer, &own));
+        for (numbers, is_newer) in [([9, 8], true), ([9, 9], false), ([8, 10], false)] {
+            assert_eq!(
+                is_from_newer(&newer, &by_step(numbers)),
+                is_newer,
+                "{numbers:?}"
+            );
+        }
     }
 }

@@ -100,20 +100,26 @@ fn is_asked_alike(one: &Manifest, other: &Manifest) -> bool {
     match (&one.computed, &other.computed) {
         // Carbon is accumulated from a start on.
         (None, None) => first_instant(one) == first_instant(other),
-        (Some(one), Some(other)) => {
+        (Some(own), Some(others)) => {
             let inputs = |of: &Computed| {
                 let named = |it: &ComputedInput| {
                     (it.name.clone(), it.manifest.product.clone(), it.matching)
                 };
                 of.inputs.iter().map(named).collect::<Vec<_>>()
             };
-            one.how == other.how
-                && (one.from, one.to) == (other.from, other.to)
-                && one.map == other.map
-                && inputs(one) == inputs(other)
+            own.how == others.how
+                && (own.from, own.to) == (others.from, others.to)
+                && own.map == others.map
+                && inputs(own) == inputs(others)
+                && (!own.how.is_by_step() || is_same_thing(one, other))
         }
         _ => false,
     }
+}
+
+/// What is computed step by step is asked for with a title and a quantity, which statistics have of their sources.
+fn is_same_thing(one: &Manifest, other: &Manifest) -> bool {
+    one.title == other.title && one.quantity.is_same_kind(other.quantity)
 }
 
 /// When the first step of a version begins.

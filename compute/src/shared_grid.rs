@@ -1,10 +1,10 @@
 //! Whether two products lie on one grid, and what brings one to that of the other.
 
-use contract::computed::Regridding;
 use contract::grid::Grid;
 use contract::manifest::Manifest;
 
 use crate::ComputeError;
+use crate::summed::usual_regridding;
 
 /// Do both lie on one grid, so that a cell of one is that cell of the other?
 ///
@@ -20,13 +20,13 @@ pub(crate) fn check(first: &Manifest, second: &Manifest) -> Result<(), ComputeEr
          fluxglobe derive regrid --product {others} --like {own} --method {}",
         in_words(&first.grid),
         in_words(&second.grid),
-        Regridding::Conservative,
+        usual_regridding(second),
     );
     Err(ComputeError::Expression { reason })
 }
 
 /// Are two grids the same but for the noise of their axes?
-fn is_same(a: &Grid, b: &Grid) -> bool {
+pub(crate) fn is_same(a: &Grid, b: &Grid) -> bool {
     /// Share of a cell: axes of files are written with five digits and more.
     const SLACK_CELLS: f64 = 1e-3;
     let near = |a: f64, b: f64, step: f64| (a - b).abs() < SLACK_CELLS * step;

@@ -170,6 +170,9 @@ impl Grid {
         };
         let east = (place.lon - self.west_deg).rem_euclid(360.0);
         let col = (east / self.dlon_deg).floor();
+        // Round the earth the last edge, which rounding makes of a place a hair west of the first, is the first.
+        let is_last_edge = self.is_periodic() && col >= f64::from(self.cols);
+        let col = if is_last_edge { 0.0 } else { col };
         let inside = row >= 0.0 && row < f64::from(self.rows) && col < f64::from(self.cols);
         inside.then_some((row as u32, col as u32))
     }
@@ -232,6 +235,25 @@ mod tests {
         assert_eq!(at(180.0, 0.5), Some((89, 0)));
         assert_eq!(at(-180.0, 0.5), Some((89, 0)));
         assert_eq!(at(179.999, 0.5), Some((89, 359)));
+    }
+
+    #[test]
+    fn a_place_a_rounding_west_of_the_first_edge_of_a_globe_has_a_cell() {
+        let quarter = Grid {
+            rows: 720,
+            cols: 1440,
+            west_deg: -0.125,
+            dlat_deg: 0.25,
+            dlon_deg: 0.25,
+            ..ONE_DEGREE
+        };
+        let lon = -0.125 - f64::EPSILON;
+        assert_eq!(quarter.cell_at(LonLatDeg { lon, lat: 0.1 }), Some((359, 0)));
+        let half = Grid {
+            cols: 720,
+            ..quarter
+        };
+        assert_eq!(half.cell_at(LonLatDeg { lon, lat: 0.1 }), None);
     }
 
     #[test]

@@ -44,7 +44,7 @@ pub fn hovmoller<'a>(
     query: &'a HovmollerQuery,
 ) -> BoxFuture<'a, Result<Hovmoller, ComputeError>> {
     Box::pin(async move {
-        check_averaged(manifest)?;
+        check_averaged(engine.store(), manifest).await?;
         let (_window, steps) = manifest.steps_inside(query.from, query.to)?;
         let grid = &manifest.grid;
         let band_deg = band_deg(manifest, query)?;

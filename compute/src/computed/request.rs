@@ -29,7 +29,8 @@ pub struct Request {
 }
 
 impl Request {
-    /// The request that a computed version was made by; none of what was made in another way.
+    /// The request that a computed version was made by; none of what was made in another way. What it has of its inputs is what
+    /// they have now: an expression their grid, what is brought to another grid its quantity.
     pub(crate) fn of(manifest: &Manifest) -> Option<Self> {
         let computed = manifest.computed.as_ref();
         let computed = computed.filter(|it| it.how.is_by_step())?;
@@ -38,12 +39,13 @@ impl Request {
             product: input.manifest.product.clone(),
             matching: input.matching,
         };
+        let is_regridded = matches!(computed.how, Computation::Regrid { .. });
         Some(Self {
             target: manifest.product.clone(),
             title: Some(manifest.title.clone()),
-            quantity: Some(manifest.quantity),
+            quantity: (!is_regridded).then_some(manifest.quantity),
             how: computed.how.clone(),
-            grid: Some(manifest.grid),
+            grid: is_regridded.then_some(manifest.grid),
             inputs: computed.inputs.iter().map(input).collect(),
             from: computed.from,
             to: computed.to,

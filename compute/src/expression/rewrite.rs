@@ -1,5 +1,5 @@
-//! A parsed expression made ready: numbers are `f64`, `unit(...)` is the number that it stands for, `coalesce` is a CASE, and
-//! calls of our functions count where they leave the range of their paper.
+//! A parsed expression made ready: numbers are `f64`, `unit(...)` is the number that it stands for, `coalesce` is a CASE, what is
+//! no number compares with nothing, and calls of our functions count where they leave the range of their paper.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -9,11 +9,11 @@ use datafusion::common::metadata::FieldMetadata;
 use datafusion::common::tree_node::{Transformed, TreeNode as _, TreeNodeRecursion};
 use datafusion::common::{DataFusionError, Result, ScalarValue, plan_err};
 use datafusion::logical_expr::expr::{Case, ScalarFunction};
-use datafusion::logical_expr::{Expr, ScalarUDF, lit};
+use datafusion::logical_expr::{Between, BinaryExpr, Expr, Operator, ScalarUDF, lit};
 
 use super::function::Function;
 use super::typed::{OFFSET_KEY, UNIT_KEY};
-use super::udf::NumberFunction;
+use super::udf::{ComparedFunction, NumberFunction};
 use super::unit::Scaled;
 
 /// Numbers as `f64`, so that `1/2` is a half; and those with a unit in SI, their unit beside them.
@@ -79,8 +79,9 @@ fn with_unit(arguments: &[Expr]) -> Result<Expr> {
 /// How often each function was called outside the range of its paper.
 pub(super) type Outside = BTreeMap<&'static str, Arc<AtomicU64>>;
 
-/// Calls that count, and CASE for `coalesce`, which the engine evaluates in this shape alone.
+/// Calls that count, comparisons of numbers alone, and CASE for `coalesce`, which the engine evaluates in this shape alone.
 pub(super) fn runnable(expr: Expr, outside: &mut Outside) -> Result<Expr> {
+    let compared = Arc::new(ScalarUDF::from(ComparedFunction::new()));
     let run = |expr: Expr| {
         Ok(match expr {
             Expr::Literal(value, Some(_)) => Transformed::yes(Expr::Literal(value, None)),
@@ -103,10 +104,46 @@ pub(super) fn runnable(expr: Expr, outside: &mut Outside) -> Result<Expr> {
                 }
                 None => Transformed::no(Expr::ScalarFunction(call)),
             },
+            Expr::BinaryExpr(both) if is_comparison(both.op) => {
+                let [left, right] = [*both.left, *both.right]
+                    .map(|side| Box::new(number_or_nothing(side, &compared)));
+                Transformed::yes(Expr::BinaryExpr(BinaryExpr::new(left, both.op, right)))
+            }
+            Expr::Between(Between {
+                expr,
+                negated,
+                low,
+                high,
+            }) => {
+                let [expr, low, high] =
+                    [*expr, *low, *high].map(|part| Box::new(number_or_nothing(part, &compared)));
+                Transformed::yes(Expr::Between(Between::new(expr, negated, low, high)))
+            }
             other => Transformed::no(other),
         })
     };
     expr.transform_up(run).map(|done| done.data)
+}
+
+fn is_comparison(operator: Operator) -> bool {
+    matches!(
+        operator,
+        Operator::Lt
+            | Operator::LtEq
+            | Operator::Gt
+            | Operator::GtEq
+            | Operator::Eq
+            | Operator::NotEq
+    )
+}
+
+/// What is compared, as [`ComparedFunction`] has it; inputs and numbers that are written are numbers, or nothing, as they are.
+fn number_or_nothing(expr: Expr, compared: &Arc<ScalarUDF>) -> Expr {
+    if matches!(expr, Expr::Column(_) | Expr::Literal(..)) {
+        return expr;
+    }
+    let (func, args) = (Arc::clone(compared), vec![expr]);
+    Expr::ScalarFunction(ScalarFunction { func, args })
 }
 
 fn first_there(mut arguments: Vec<Expr>) -> Result<Expr> {

@@ -106,6 +106,41 @@ fn what_is_no_number_is_no_data_and_counted() {
     assert_eq!(evaluate("sqrt(pco2 * pco2 * -1)").not_finite, 4);
 }
 
+/// Without ice 0 / 0, in the first cell and in the last, which is none by bits below or above every number.
+#[test]
+fn no_comparison_with_what_is_no_number_is_true() {
+    for truth in [
+        "ice / ice < 2",
+        "ice / ice <= 1",
+        "ice / ice > 0",
+        "ice / ice >= 1",
+        "2 > ice / ice",
+        "0 < ice / ice",
+        "ice / ice = 1",
+        "ice / ice <> 2",
+        "ice / ice = ice / ice",
+        "NOT ice / ice < 1",
+        "NOT ice / ice > 1",
+        "NOT (ice / ice > 1 OR ice / ice < 1)",
+        "ice / ice BETWEEN 0 AND 2",
+        "ice / ice NOT BETWEEN 2 AND 3",
+        "1 BETWEEN ice / ice AND 2",
+        "-(ice / ice) < 0",
+        "-(ice / ice) > -2",
+        "sqrt(ice - 0.25) > 0",
+        "sqrt(ice - 0.25) < 1",
+    ] {
+        let chosen = evaluate(&format!("CASE WHEN {truth} THEN 1 ELSE 2 END"));
+        let expected = [2.0, 1.0, f64::NAN, 2.0];
+        let is_same = |(found, expected): (&f64, &f64)| found.total_cmp(expected).is_eq();
+        let mut all = chosen.values.iter().zip(&expected);
+        assert!(all.all(is_same), "{truth}: {:?}", chosen.values);
+        assert_eq!(chosen.not_finite, 0);
+    }
+    // Only what is compared is none: without a comparison it is masked and counted as before.
+    assert_eq!(evaluate("ice / ice").not_finite, 2);
+}
+
 #[test]
 fn mixed_units_and_whatever_is_no_arithmetic_are_refused_with_the_reason() {
     for (text, reason) in [

@@ -137,6 +137,49 @@ impl ScalarUDFImpl for UnitFunction {
     }
 }
 
+/// What is compared: a number, and nothing where it is none, so that no comparison with it is true. By their bits numbers that are none
+/// lie below or above all others, and 0 / 0 is either by the machine. Expressions put it about what they compare; it cannot be written.
+#[derive(Debug, PartialEq, Eq, Hash)]
+pub(super) struct ComparedFunction {
+    signature: Signature,
+}
+
+impl ComparedFunction {
+    pub(super) fn new() -> Self {
+        Self {
+            signature: Signature::exact(vec![DataType::Float64], Volatility::Immutable),
+        }
+    }
+}
+
+impl ScalarUDFImpl for ComparedFunction {
+    fn name(&self) -> &'static str {
+        "compared"
+    }
+
+    fn signature(&self) -> &Signature {
+        &self.signature
+    }
+
+    fn return_type(&self, _arguments: &[DataType]) -> Result<DataType> {
+        Ok(DataType::Float64)
+    }
+
+    fn invoke_with_args(&self, args: ScalarFunctionArgs) -> Result<ColumnarValue> {
+        let rows = args.number_rows;
+        let Some(argument) = args.args.into_iter().next() else {
+            return exec_err!("nothing is compared");
+        };
+        let column = argument.into_array(rows)?;
+        let Some(column) = column.as_primitive_opt::<Float64Type>() else {
+            return exec_err!("numbers of 64 bits are compared");
+        };
+        let number = |value: Option<f64>| value.filter(|it| !it.is_nan());
+        let out: Float64Array = column.iter().map(number).collect();
+        Ok(ColumnarValue::Array(Arc::new(out)))
+    }
+}
+
 /// All of them, for a session.
 pub(crate) fn number_functions() -> impl Iterator<Item = ScalarUDF> {
     ALL.iter()

@@ -21,6 +21,15 @@ fn holding(position: f64, count: u32) -> Option<u32> {
     (position >= 0.0 && position < f64::from(count)).then_some(position as u32)
 }
 
+/// The column of the source that a position lies in, as [`centre_in_cells`] has it; none outside.
+///
+/// A place a hair west of the first edge of a grid round the earth is nearly a turn east of it, which rounding makes the last edge: it
+/// is the first one.
+fn holding_col(position: f64, source: &Grid) -> Option<u32> {
+    let held = holding(position, source.cols);
+    held.or_else(|| source.is_periodic().then_some(0))
+}
+
 /// Rows of the source that hold the centres of the target's.
 pub fn nearest_rows(source: &Grid, target: &Grid) -> Vec<Parts> {
     let of_row = |row: u32| {
@@ -35,7 +44,7 @@ pub fn nearest_rows(source: &Grid, target: &Grid) -> Vec<Parts> {
 pub fn nearest_cols(source: &Grid, target: &Grid) -> Vec<Parts> {
     let of_col = |col: u32| {
         let position = centre_in_cells(source, target, col);
-        one(holding(position, source.cols))
+        one(holding_col(position, source))
     };
     (0..target.cols).map(of_col).collect()
 }
@@ -70,7 +79,7 @@ pub fn bilinear_rows(source: &Grid, target: &Grid) -> Vec<Parts> {
 pub fn bilinear_cols(source: &Grid, target: &Grid) -> Vec<Parts> {
     let of_col = |col: u32| {
         let position = centre_in_cells(source, target, col);
-        match holding(position, source.cols) {
+        match holding_col(position, source) {
             None => one(None),
             Some(_) => between(position - 0.5, source.cols, source.is_periodic()),
         }

@@ -153,6 +153,44 @@ fn round_the_earth_bilinear_goes_over_the_seam_and_outside_there_is_nothing() {
     }
 }
 
+/// Pairs of grids round the earth of which a centre of the target lies a rounding west of the source's first edge.
+#[test]
+fn no_column_of_a_globe_is_lost_where_rounding_makes_the_first_edge_the_last() {
+    let globe = |cols: u32, west_deg: f64| Grid {
+        rows: 2,
+        cols,
+        north_deg: 90.0,
+        west_deg,
+        dlat_deg: 90.0,
+        dlon_deg: 360.0 / f64::from(cols),
+    };
+    for (cols, west_deg, to_cols) in [
+        (1440, -0.125, 4320),
+        (144, -1.25, 2160),
+        (720, -0.25, 2160),
+        (288, -0.625, 4320),
+        (192, -0.9375, 8640),
+        (4320, -1.0 / 24.0, 4320),
+    ] {
+        let (source, target) = (globe(cols, west_deg), globe(to_cols, -180.0));
+        for of_cols in [axis::nearest_cols, axis::bilinear_cols] {
+            let parts = of_cols(&source, &target);
+            let empty = parts.iter().position(|of| of.parts.is_empty());
+            assert_eq!(empty, None, "{cols} from {west_deg} to {to_cols}");
+        }
+        // The seam of the source is half way between its last and its first centre.
+        let values: Vec<f32> = (0..2 * cols).map(|it| (it % cols) as f32).collect();
+        let bilinear = Regridder::new(&source, &target, Regridding::Bilinear);
+        let out = bilinear.apply(&values).unwrap();
+        let middle = f64::from(cols - 1) / 2.0;
+        let at_seam = |value: &f64| (value - middle).abs() < 1e-6;
+        let west = |col: u32| (target.col_west_deg(col) + 0.5 * target.dlon_deg - west_deg).abs();
+        let seam = (0..to_cols).min_by(|a, b| west(*a).total_cmp(&west(*b)));
+        assert!(at_seam(&out.values[seam.unwrap() as usize]), "{cols}");
+        assert!(out.coverage.iter().all(|it| (it - 1.0).abs() < 1e-12));
+    }
+}
+
 proptest! {
     #[test]
     fn any_grids_keep_the_integral_and_no_value_leaves_the_range(

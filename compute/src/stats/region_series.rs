@@ -30,7 +30,7 @@ pub fn region_series_of<'a>(
     manifest: &'a Manifest,
 ) -> BoxFuture<'a, Result<RegionSeries, ComputeError>> {
     Box::pin(async move {
-        check_averaged(manifest)?;
+        check_averaged(engine.store(), manifest).await?;
         let (_window, steps) = manifest.steps_inside(query.from, query.to)?;
         let area = AskedArea {
             region: &query.region,

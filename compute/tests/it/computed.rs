@@ -7,7 +7,7 @@ use contract::computed::{Computation, Matching, Regridding};
 use contract::earth::Earth;
 use contract::grid::{Grid, LonLatDeg};
 use contract::manifest::Manifest;
-use contract::quantity::Quantity;
+use contract::quantity::{Flag, OpenQuantity, OpenWords, Quantity};
 use contract::statistics::StatisticsQuery;
 use contract::time::{Period, TimeStep};
 use storage::{Store, domain, fields, manifests};
@@ -316,6 +316,100 @@ async fn what_makes_no_sense_is_refused_before_anything_is_stored() {
         matches!(error, ComputeError::UnknownProduct { .. }),
         "{error}"
     );
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn what_is_brought_to_another_grid_holds_what_its_source_holds_now_and_keeps_its_steps() {
+    let (_folder, store) = folder_store();
+    let engine = Engine::in_process(store.clone(), parts(2));
+    let year = wavy_year(&ONE_DEGREE);
+    let plain = Quantity::open("uptake", "1", "Uptake").unwrap();
+    let [narrow, wide] = [[0.0, 1.0], [-5.0, 9.0]].map(|range| plain.over(range).unwrap());
+    let source = product("source");
+    land(&store, &source, narrow, ONE_DEGREE, &year[..10]).await;
+    let request = Request {
+        target: product("coarse"),
+        quantity: None,
+        how: Computation::Regrid {
+            method: Regridding::Nearest,
+            min_coverage: 0.5,
+        },
+        grid: Some(FOUR_DEGREES),
+        ..asked("", &["source"])
+    };
+    let first = computed(&engine, &request).await.manifest;
+    assert_eq!(first.quantity, narrow);
+    // The range of a quantity grows with what lands.
+    land(&store, &source, wide, ONE_DEGREE, &year).await;
+    let outcome = computed(&engine, &request).await;
+    let second = &outcome.manifest;
+    assert_eq!((second.number, second.quantity), (2, wide));
+    assert_eq!((outcome.kept_count, second.steps.len()), (10, 12));
+    assert_eq!(second.steps[..10], first.steps);
+    // It was taken for something else, and its files are read anew.
+    land(&store, &source, Quantity::IceFraction, ONE_DEGREE, &year).await;
+    let made = compute::dependents::follow(&engine, &source).await.unwrap();
+    assert_eq!(made.len(), 1);
+    assert_eq!(made[0].quantity, Quantity::IceFraction);
+    assert_eq!(made[0].number, 3);
+}
+
+/// Between sea (0) and land (2) there is no coast (1).
+#[tokio::test(flavor = "multi_thread")]
+async fn codes_are_brought_to_another_grid_by_the_nearest_alone() {
+    let (_folder, store) = folder_store();
+    land_inputs(&store).await;
+    let flag = |value, meaning: &str| Flag {
+        value,
+        meaning: meaning.to_owned(),
+    };
+    let words = OpenWords {
+        name: "surface".to_owned(),
+        unit: "1".to_owned(),
+        title: "Surface".to_owned(),
+        range: None,
+        flags: vec![flag(0, "sea"), flag(1, "coast"), flag(2, "land")],
+        is_standard_name: false,
+    };
+    let surface = Quantity::Open(OpenQuantity::new(words).unwrap());
+    let coarse = Grid {
+        rows: 9,
+        cols: 18,
+        dlat_deg: 20.0,
+        dlon_deg: 20.0,
+        ..FOUR_DEGREES
+    };
+    let codes: Vec<f32> = (0..coarse.cell_count())
+        .map(|it| (it % 2 * 2) as f32)
+        .collect();
+    let year = [(Period::year(2000).unwrap(), codes)];
+    land(&store, &product("mask"), surface, coarse, &year).await;
+    let engine = Engine::in_process(store.clone(), parts(1));
+    let request = |method| Request {
+        target: product("mask-fine"),
+        quantity: None,
+        how: Computation::Regrid {
+            method,
+            min_coverage: 0.5,
+        },
+        grid: Some(FOUR_DEGREES),
+        ..asked("", &["mask"])
+    };
+    for method in [Regridding::Bilinear, Regridding::Conservative] {
+        let error = compute(&engine, &request(method), &|_| ()).await;
+        let error = error.unwrap_err();
+        assert_eq!(error.class(), ErrorClass::BadRequest, "{error:?}");
+        assert!(error.to_string().contains("--method nearest"), "{error}");
+    }
+    let mask = computed(&engine, &request(Regridding::Nearest)).await;
+    assert_eq!(mask.manifest.quantity, surface);
+    let there = values(&store, &mask.manifest, 0).await;
+    assert!(there.iter().all(|code| [0.0, 2.0].contains(code)));
+    // What is advised where grids differ is what is done.
+    let mixed = asked("wind * mask", &["wind", "mask"]);
+    let error = compute(&engine, &mixed, &|_| ()).await.unwrap_err();
+    let advice = "fluxglobe derive regrid --product mask --like wind --method nearest";
+    assert!(error.to_string().contains(advice), "{error}");
 }
 
 #[tokio::test(flavor = "multi_thread")]

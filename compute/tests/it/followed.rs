@@ -337,6 +337,44 @@ async fn a_flux_has_its_carbon_accumulated_and_statistics_of_that_follow() {
     );
 }
 
+/// As when files are read anew whose axes were taken for half a cell off.
+#[tokio::test(flavor = "multi_thread")]
+async fn an_expression_goes_where_its_inputs_went_and_stays_while_they_have_parted() {
+    let (_folder, store) = folder_store();
+    for name in ["sst", "other"] {
+        landed(&store, name, 12, 1).await;
+    }
+    let engine = Engine::in_process(store.clone(), parts(2));
+    computed(&engine, &expression("twice", "2 * sst", &["sst"])).await;
+    let sum = expression("sum", "sst + other", &["sst", "other"]);
+    computed(&engine, &sum).await;
+    let moved = Grid {
+        north_deg: GRID.north_deg - 0.5,
+        west_deg: GRID.west_deg + 0.5,
+        ..GRID
+    };
+    let land_moved = async |name: &str| {
+        let (name, steps) = (product(name), months(12, 1));
+        land(&store, &name, Quantity::WindSpeed, moved, &steps).await
+    };
+    let made = |name: &str| [(name.to_owned(), 2)];
+    land_moved("sst").await;
+    assert_eq!(followed(&engine, "sst").await, made("twice"));
+    assert_eq!(latest(&store, "twice").await.grid, moved);
+    let left = latest(&store, "sum").await;
+    assert_eq!((left.number, left.grid), (1, GRID));
+    land_moved("other").await;
+    assert_eq!(followed(&engine, "other").await, made("sum"));
+    assert_eq!(latest(&store, "sum").await.grid, moved);
+    // Whoever asks for it gets the same; something else under its name is refused where grids differ.
+    assert_eq!(computed(&engine, &sum).await.number, 2);
+    landed(&store, "sst", 12, 1).await;
+    let other = expression("twice", "3 * sst", &["sst"]);
+    let refused = compute(&engine, &other, &|_| ()).await.unwrap_err();
+    let refused = refused.to_string();
+    assert!(refused.contains("on another grid"), "{refused}");
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn a_newer_version_of_the_same_steps_is_said_and_not_computed() {
     let (_folder, store) = folder_store();
@@ -514,6 +552,63 @@ async fn what_somebody_asks_for_is_made_of_what_came_meanwhile() {
     assert_eq!(made.computed.as_ref().unwrap().from, later.from);
     assert_eq!(made.derived_from, Some(latest(&store, "sst").await.id()));
     assert_eq!(made.number, 3);
+}
+
+/// Computes a product, while as soon as that has begun more lands and what is made of it is brought up.
+async fn computed_while_more_lands(engine: &Engine, store: &Store, request: &Request) -> Manifest {
+    let has_begun = AtomicBool::new(false);
+    let (other, target) = ((engine.clone(), store.clone()), request.target.clone());
+    let on_progress = |_: DeriveProgress| {
+        if has_begun.swap(true, Ordering::Relaxed) {
+            return;
+        }
+        let ((engine, store), target) = (other.clone(), target.to_string());
+        let landing = std::thread::spawn(move || {
+            let runtime = tokio::runtime::Runtime::new().unwrap();
+            runtime.block_on(async {
+                landed(&store, "sst", 14, 1).await;
+                assert_eq!(followed(&engine, "sst").await, [(target, 2)]);
+            });
+        });
+        landing.join().unwrap();
+    };
+    let outcome = compute(engine, request, &on_progress).await;
+    assert!(has_begun.load(Ordering::Relaxed), "nothing was made");
+    outcome.unwrap().manifest
+}
+
+/// As [`what_somebody_asks_for_is_made_of_what_came_meanwhile`], step by step.
+#[tokio::test(flavor = "multi_thread")]
+async fn an_expression_is_computed_of_what_came_meanwhile() {
+    // Asked for otherwise it is made again; asked for as it is there, it is there.
+    for (text, title, number) in [
+        ("3 * sst", None, 3),
+        ("2 * sst", Some("Of two"), 3),
+        ("2 * sst", None, 2),
+    ] {
+        let (_folder, store) = folder_store();
+        landed(&store, "sst", 12, 1).await;
+        let engine = Engine::in_process(store.clone(), parts(2));
+        computed(&engine, &expression("twice", "2 * sst", &["sst"])).await;
+        landed(&store, "sst", 13, 1).await;
+        let request = Request {
+            title: title.map(str::to_owned),
+            ..expression("twice", text, &["sst"])
+        };
+        let made = computed_while_more_lands(&engine, &store, &request).await;
+        assert_eq!(made, latest(&store, "twice").await);
+        assert_eq!((made.number, made.steps.len()), (number, 14), "{text}");
+        assert!(title.is_none_or(|title| made.title == title));
+        let computed = made.computed.unwrap();
+        let sst = latest(&store, "sst").await.id();
+        assert_eq!(computed.inputs[0].manifest, sst);
+        assert_eq!(
+            computed.how,
+            Computation::Expression {
+                expression: text.to_owned()
+            }
+        );
+    }
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -1,13 +1,16 @@
 //! Statistics of every cell as products.
 
 use compute::analysis::trend::trend as trend_of_series;
+use compute::computed::{Request, RequestedInput, compute};
 use compute::derive::{derive_statistic, derive_statistics};
 use compute::reduce::statistics as statistics_of_newest;
 use compute::{ComputeError, Engine, ErrorClass};
 use contract::analysis::{CalendarBins, MapOptions, MapStatistic};
+use contract::computed::{Computation, Matching, Regridding};
 use contract::geometry::{AskedGeometry, Sampling};
 use contract::grid::{Grid, LonLatDeg};
 use contract::manifest::Manifest;
+use contract::product::ProductId;
 use contract::quantity::Quantity;
 use contract::statistics::{StatisticsQuery, StatisticsRow};
 use contract::time::{Period, TimeStep};
@@ -763,16 +766,63 @@ async fn chances_are_those_of_the_test_that_is_asked_for() {
     assert!(compared > 50 && telling > 10, "{compared} {telling}");
 }
 
-/// The mean of 1 January and 31 December is no day of July.
+/// A product on a grid of cells twice as wide.
+async fn regridded(
+    engine: &Engine,
+    source: &str,
+    method: Regridding,
+) -> Result<Manifest, ComputeError> {
+    let wide = Grid {
+        rows: 10,
+        cols: 19,
+        dlat_deg: 2.0,
+        dlon_deg: 2.0,
+        ..GRID
+    };
+    let request = Request {
+        target: product(&format!("{source}-{method}")),
+        title: None,
+        quantity: None,
+        how: Computation::Regrid {
+            method,
+            min_coverage: 0.5,
+        },
+        grid: Some(wide),
+        inputs: vec![RequestedInput {
+            name: "source".to_owned(),
+            product: product(source),
+            matching: Matching::SamePeriod,
+        }],
+        from: None,
+        to: None,
+    };
+    let outcome = compute(engine, &request, &|_| ()).await;
+    outcome.map(|outcome| outcome.manifest)
+}
+
+/// The mean of 1 January and 31 December is no day of July, of whichever cells.
 #[tokio::test(flavor = "multi_thread")]
 async fn days_of_the_year_are_not_averaged() {
     let (_folder, store) = folder_store();
     landed(&store).await;
     let engine = Engine::in_process(store.clone(), parts(2));
     let phase = derived(&engine, &MapOptions::new(MapStatistic::Phase)).await;
-    let phase = phase.unwrap();
+    let phase = phase.unwrap().product;
+    let wide = regridded(&engine, phase.as_str(), Regridding::Nearest).await;
+    let wide = wide.unwrap().product;
+    for source in [&phase, &wide] {
+        for method in [Regridding::Bilinear, Regridding::Conservative] {
+            let error = regridded(&engine, source.as_str(), method).await;
+            let error = error.unwrap_err().to_string();
+            assert!(error.contains("go round"), "{error}");
+        }
+        days_are_not_averaged(&engine, source).await;
+    }
+}
+
+async fn days_are_not_averaged(engine: &Engine, phase: &ProductId) {
     let of = |geometry: AskedGeometry, statistics: &str| StatisticsQuery {
-        product: phase.product.clone(),
+        product: phase.clone(),
         ..asked(geometry, statistics, TimeStep::Native)
     };
     let place = LonLatDeg::new(-20.5, 30.5).unwrap();
@@ -790,7 +840,7 @@ async fn days_of_the_year_are_not_averaged() {
         ),
         (of(over(), "count,coverage"), true),
     ] {
-        let found = statistics_of_newest(&engine, &query).await;
+        let found = statistics_of_newest(engine, &query).await;
         match found {
             Ok(_) => assert!(is_told, "{query:?}"),
             Err(error) => {

@@ -111,7 +111,8 @@ pub(crate) struct Regrid {
     /// Product whose grid it is brought to.
     #[arg(long)]
     pub(crate) like: ProductId,
-    /// nearest, bilinear, or conservative: the mean by exact area of overlap on WGS84, which keeps integrals.
+    /// nearest, bilinear, or conservative: the mean by exact area of overlap on WGS84, which keeps integrals. Codes of a mask and days of the
+    /// year have no means: nearest alone.
     #[arg(long)]
     pub(crate) method: Regridding,
     /// Least share of a cell that data must cover, 0 to 1; less is no data.

@@ -26,9 +26,11 @@ first. With --lag 2 the second is read two months after the first, with --lag=-2
 maps of several lags a --name each.
 Both lie on one grid: `fluxglobe derive regrid` brings one to that of the other.
 
-What a statistic was made from and how it was asked for is in its manifest (`computed`). When there
-is a newer version of that, of either of two, the deriver of a cluster (in the scheduler's process)
-makes it anew, with all else that was made from it; asked again, the same is done at once. Steps
+What a statistic was made from and how it was asked for is in its manifest (`computed`). When
+something lands in that, in either of two, or in what that was made from, the deriver of a cluster
+(in the scheduler's process) makes it anew, with all else that was made from it; asked again, the
+same is done at once. What a command derives anew takes nothing along that was made from it: the
+command names what is of an older version then, to be derived again or with the next landing. Steps
 that come are read too where --to leaves that open; a region stays what it was. One that is made
 with --once stays as it is until it is asked for again.";
 

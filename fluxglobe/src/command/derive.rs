@@ -38,8 +38,9 @@ pub(crate) async fn run(settings: &Settings, options: Derive) -> Result<()> {
             deployment::manifest(&store, &product, &settings.data).await?;
             let log = listening(settings, &kafka).await?;
             let log = log.as_deref();
-            let manifest = accumulated(settings, store, log, &product, start).await?;
-            progress::result(&manifest.id().to_string())
+            let manifest = accumulated(settings, store.clone(), log, &product, start).await?;
+            progress::result(&manifest.id().to_string())?;
+            say_what_is_behind(&store, &[manifest]).await
         }
     }
 }
@@ -164,7 +165,8 @@ async fn computed(settings: &Settings, kafka: &KafkaSettings, request: &Request)
             "{name} was called {count} times outside the range that its paper gives"
         ));
     }
-    progress::result(&manifest.id().to_string())
+    progress::result(&manifest.id().to_string())?;
+    say_what_is_behind(engine.store(), std::slice::from_ref(manifest)).await
 }
 
 fn functions() -> Result<()> {
@@ -215,6 +217,20 @@ async fn statistic(settings: &Settings, options: &DeriveStatistic) -> Result<()>
             progress::say(&line);
         }
         progress::result(&manifest.id().to_string())?;
+    }
+    say_what_is_behind(engine.store(), &made).await
+}
+
+/// Says what is made of products and still of older versions of them: the deriver reads what lands, and nothing of commands.
+async fn say_what_is_behind(store: &Store, made: &[Manifest]) -> Result<()> {
+    let made: Vec<&ProductId> = made.iter().map(|manifest| &manifest.product).collect();
+    let behind = compute::dependents::behind(store, &made).await?;
+    if !behind.is_empty() {
+        let names: Vec<&str> = behind.iter().map(ProductId::as_str).collect();
+        progress::say(&format!(
+            "made of an older version: {}; derive them again, or the deriver of a cluster does when something lands in what they are made from",
+            names.join(", ")
+        ));
     }
     Ok(())
 }
