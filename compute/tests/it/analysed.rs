@@ -426,6 +426,46 @@ async fn periods_versions_and_products_are_compared() {
     }
 }
 
+/// Of a year of seasons the winters at its ends count by the months that it has of them, wherever values are of.
+#[tokio::test(flavor = "multi_thread")]
+async fn steps_across_the_ends_of_a_period_count_by_their_time_in_it_in_every_kind_of_place() {
+    let (_folder, store) = folder_store();
+    let seasons = TimeStep::Season.whole_bins(
+        Period::new("2000-12".parse().unwrap(), "2003-12".parse().unwrap()).unwrap(),
+    );
+    assert_eq!(seasons.len(), 12);
+    // Winters stand out, m s⁻¹.
+    let value = |at: usize| (at + if at.is_multiple_of(4) { 20 } else { 0 }) as f32;
+    let field = |(at, period): (usize, Period)| (period, vec![value(at); GRID.cell_count()]);
+    let steps: Vec<_> = seasons.into_iter().enumerate().map(field).collect();
+    let manifest = wind(&store, "wind", &steps).await;
+    let engine = Engine::in_process(store.clone(), parts(2));
+    let days = [(0, 59.0), (1, 92.0), (2, 92.0), (3, 91.0), (4, 31.0)];
+    let sum: f64 = days.iter().map(|(at, days)| f64::from(value(*at)) * days).sum();
+    let mean = sum / 365.0;
+    let mut found = vec![];
+    for place in [
+        region("wind", "-131,-16,-130,-15"),
+        cell("wind", -130.5, -15.5),
+        line("wind", "-130.8,-15.2;-130.2,-15.8"),
+    ] {
+        let [of, minus] = ["2001/2001", "2002/2002"].map(|year| place.in_years(year.parse().ok()));
+        let told = differ(&engine, (&manifest, &of), (&manifest, &minus)).await;
+        let told = told.unwrap();
+        assert!((told.of.mean.unwrap() - mean).abs() < 1e-4, "{told:?}");
+        let is_year = ["2001-01-01T00:00:00Z", "2002-01-01T00:00:00Z"];
+        assert_eq!([told.of.start, told.of.end].map(|t| t.to_string()), is_year);
+        found.push(told);
+    }
+    for told in &found[1..] {
+        let numbers = |own: &Difference| [own.difference, own.standard_error, own.p_value];
+        for (a, b) in numbers(told).into_iter().zip(numbers(&found[0])) {
+            assert!((a.unwrap() - b.unwrap()).abs() < 1e-4, "{found:?}");
+        }
+        assert_eq!(told.of.count, 5);
+    }
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn the_profile_of_bands_has_their_mean_spread_and_coverage_over_the_whole_period() {
     let (_folder, store) = folder_store();
