@@ -177,7 +177,10 @@ mod tests {
         // Of twelve values less twelve means nothing is left that tells a spread.
         let few = months(12);
         let values: Vec<f64> = (0..12).map(f64::from).collect();
-        assert_eq!(mean_over_time(&few, &values, (&values, 12), all()).variance, None);
+        assert_eq!(
+            mean_over_time(&few, &values, (&values, 12), all()).variance,
+            None
+        );
     }
 
     /// Error and chance.

@@ -47,9 +47,7 @@ pub fn region_series_of<'a>(
             start: step.period.start,
             end: step.period.end,
             mid: step.period.mid(),
-            mean: step
-                .mean
-                .map(|mean| mean * display.factor + display.offset),
+            mean: step.mean.map(|mean| mean * display.factor + display.offset),
             area_m2: step.area_m2,
             coverage_percent: coverage_percent(step.sea_m2, means.ocean_m2),
         };
