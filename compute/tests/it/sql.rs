@@ -620,6 +620,17 @@ async fn functions_of_the_field_are_those_of_expressions_and_statistics_those_of
         assert_eq!(row[1..3], numbers);
         assert_eq!(row[3], "°C");
     }
+    // What has several units says that of each statistic.
+    for (asked, unit, units) in [
+        ("mean,max", "°C", "mean: °C; max: °C"),
+        ("std", "K", "std: K"),
+        ("sum", "°C m²", "sum: °C m²"),
+        ("count,coverage", "", "count: 1; coverage: %"),
+        ("mean,std", "", "mean: °C; std: K"),
+    ] {
+        let asked = format!("SELECT DISTINCT unit, units FROM stats('sst_test', '162,-10,170,10', 'month', '{asked}')");
+        assert_eq!(texts(&sql, &asked).await, [[unit, units]], "{asked}");
+    }
     // The mean by area of whole cells is that of the reduction, up to the digits that floats have.
     let plain = "SELECT mean_weighted(value, area_km2) - 273.15 FROM sst_test
         WHERE longitude BETWEEN 162 AND 170 AND latitude BETWEEN -10 AND 10 GROUP BY time_start ORDER BY time_start";
