@@ -628,7 +628,9 @@ async fn functions_of_the_field_are_those_of_expressions_and_statistics_those_of
         ("count,coverage", "", "count: 1; coverage: %"),
         ("mean,std", "", "mean: °C; std: K"),
     ] {
-        let asked = format!("SELECT DISTINCT unit, units FROM stats('sst_test', '162,-10,170,10', 'month', '{asked}')");
+        let asked = format!(
+            "SELECT DISTINCT unit, units FROM stats('sst_test', '162,-10,170,10', 'month', '{asked}')"
+        );
         assert_eq!(texts(&sql, &asked).await, [[unit, units]], "{asked}");
     }
     // The mean by area of whole cells is that of the reduction, up to the digits that floats have.
