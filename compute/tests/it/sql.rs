@@ -374,6 +374,9 @@ const REFUSED: &[(&str, &str)] = &[
         "not found; products are sst-test",
     ),
     ("SELECT depth FROM sst_test", "depth"),
+    ("SHOW FULL COLUMNS FROM sst_test", "ask DESCRIBE"),
+    ("SHOW COLUMNS FROM sst_test LIKE 'v%'", "ask DESCRIBE"),
+    ("SHOW COLUMNS FROM atlantis", "not found"),
     ("CHOOSE 1", "CHOOSE"),
     ("SELECT repeat('x', 2000000000)", "repeat is left out"),
     ("SELECT lpad('x', 2000000000)", "lpad is left out"),
@@ -578,6 +581,10 @@ async fn a_version_is_named_and_one_question_reads_one_version() {
     );
     let columns = texts(&sql, "DESCRIBE sst_test").await;
     assert_eq!(columns.len(), 6);
+    for table in ["sst_test", "\"sst-test\"", "\"sst_test@2\""] {
+        let shown = texts(&sql, &format!("SHOW COLUMNS FROM {table}")).await;
+        assert_eq!(shown, columns, "{table}");
+    }
     assert_eq!(
         texts(&sql, "SHOW TABLES")
             .await
