@@ -23,6 +23,7 @@ mod region_sums;
 pub(crate) mod remembered;
 mod remembered_shares;
 mod run;
+mod step_means;
 mod stored;
 pub(crate) mod task;
 mod tasks;
@@ -35,4 +36,5 @@ pub(crate) use percentiles::least_part;
 pub(crate) use region_sums::RegionStepSums;
 #[cfg(test)]
 pub(crate) use run::tests::{sql_of, task_of_pieces};
+pub(crate) use step_means::{RegionMeans, StepMean, means_over_region};
 pub(crate) use tasks::are_fields_less;

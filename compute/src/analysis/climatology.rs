@@ -7,6 +7,7 @@ use contract::analysis::{
 };
 use contract::time::Period;
 
+use super::correlation::varies;
 use super::timeline::longest_s;
 use super::undefined::Undefined;
 
@@ -202,9 +203,13 @@ pub fn mean(values: &[f64]) -> Option<f64> {
     (!values.is_empty()).then(|| sum / values.len() as f64)
 }
 
-/// Standard deviation √(Σ (x - m)² / (n - 1)); none of fewer than two. In two passes, so that large means cost no digits.
+/// Standard deviation √(Σ (x - m)² / (n - 1)); none of fewer than two, 0 of values that are all equal. In two passes, so that large means
+/// cost no digits.
 pub fn spread(values: &[f64]) -> Option<f64> {
     let mean = mean(values).filter(|_| values.len() > 1)?;
+    if !varies(values.iter().copied()) {
+        return Some(0.0);
+    }
     let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
     Some((squares / (values.len() - 1) as f64).sqrt())
 }

@@ -98,7 +98,8 @@ fn pearson(pairs: &[(f64, f64)]) -> Result<f64, Undefined> {
         });
     }
     let constant = |side| Undefined::ConstantSide { side, count: n };
-    match (varies(pairs, |pair| pair.0), varies(pairs, |pair| pair.1)) {
+    let varies = |of: fn(&(f64, f64)) -> f64| varies(pairs.iter().map(of));
+    match (varies(|pair| pair.0), varies(|pair| pair.1)) {
         (true, true) => {}
         (false, true) => return Err(constant(FIRST)),
         (true, false) => return Err(constant(SECOND)),
@@ -120,9 +121,9 @@ fn pearson(pairs: &[(f64, f64)]) -> Result<f64, Undefined> {
     is_told.then(correlation).ok_or_else(|| constant(BOTH))
 }
 
-/// Are there two values of one side that differ by more than rounding?
-fn varies(pairs: &[(f64, f64)], of: fn(&(f64, f64)) -> f64) -> bool {
-    let values = pairs.iter().map(of);
+/// Are there two values, none NaN, that differ by more than rounding? The mean of equal values lies beside them by rounding, and squares of that are
+/// no spread.
+pub fn varies(values: impl Iterator<Item = f64>) -> bool {
     let [low, high] = values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| {
         [low.min(value), high.max(value)]
     });

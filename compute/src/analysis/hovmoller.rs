@@ -19,7 +19,7 @@ use storage::{Store, domain};
 use super::banded::Banded;
 use super::bands::{BandAreas, BandSum, Bands};
 use super::read::Version;
-use super::timeline::{bins_over, no_shorter};
+use super::timeline::no_shorter;
 use crate::step_range::step_range;
 use crate::summed::check_averaged;
 use crate::{ComputeError, Engine};
@@ -33,11 +33,12 @@ const BANDS_DEG: [f64; 4] = [1.0, 2.0, 5.0, 10.0];
 ///
 /// Of each step the cells inside the bounds are read, with what is stored round them. Each counts by area and time: the mean of a month is that of all its
 /// cells with data over all its time, so that a cell that is seen once counts by the step that saw it. Of polygons each cell counts by its
-/// exact share, as in the mean over the polygons clipped to a band; a cell that an edge of a band cuts is in the band of its middle.
+/// exact share, as in the mean over the polygons clipped to a band; a cell that an edge of a band cuts is in the band of its middle. Rows end
+/// with the asked period and with what steps cover of it: a step across an end counts by its time inside, and coverage is of the rest of the bin.
 ///
 /// # Errors
-/// No step in the period, nothing of the grid inside the bounds or the region, bands below the size of cells, more means than one answer
-/// holds.
+/// No step in the period, nothing of the grid inside the bounds or the region, bands below the size of cells, more means, or rows, than one
+/// answer holds.
 pub fn hovmoller<'a>(
     engine: &'a Engine,
     (manifest, id): Version<'a>,
@@ -45,7 +46,7 @@ pub fn hovmoller<'a>(
 ) -> BoxFuture<'a, Result<Hovmoller, ComputeError>> {
     Box::pin(async move {
         check_averaged(engine.store(), manifest).await?;
-        let (_window, steps) = manifest.steps_inside(query.from, query.to)?;
+        let (window, steps) = manifest.steps_inside(query.from, query.to)?;
         let grid = &manifest.grid;
         let band_deg = band_deg(manifest, query)?;
         let banded = match query.region.as_ref().map(|asked| &asked.region) {
@@ -71,7 +72,7 @@ pub fn hovmoller<'a>(
         let bands = &banded.bands;
         let periods: Vec<Period> = steps.iter().map(|step| step.period).collect();
         let step = no_shorter(&periods, query.step);
-        let bins = bins_over(&periods, step);
+        let bins = step.bins(covered(window, &periods), periods.iter().copied())?;
         let means = bins.len().saturating_mul(bands.edges_deg().len());
         if means > MOST_MEANS {
             let reason = format!(
@@ -110,6 +111,16 @@ pub fn hovmoller<'a>(
             rows: all,
         })
     })
+}
+
+/// What steps that reach into a period cover of it: rows are of that and of nothing else.
+fn covered(window: Period, steps: &[Period]) -> Period {
+    let start = steps.first().map_or(window.start, |step| step.start);
+    let end = steps.last().map_or(window.end, |step| step.end);
+    Period {
+        start: start.max(window.start),
+        end: end.min(window.end),
+    }
 }
 
 /// What rows are made with.

@@ -11,7 +11,7 @@ use super::line::with_holes;
 pub struct MeanOverTime {
     /// Steps with data.
     pub count: usize,
-    /// Each step by its length; none without data.
+    /// Each step by its time in the period; none without data.
     pub mean: Option<f64>,
     /// Effective number of steps; none of fewer than two.
     pub effective_count: Option<f64>,
@@ -21,18 +21,21 @@ pub struct MeanOverTime {
     freedom: f64,
 }
 
-/// The mean of `values` (beside `periods`, NaN no data, any unit) over time. Its error comes from the spread of `about`, one
-/// beside each value: the values less what is no chance in them, such as their seasons, of which `means` were taken off: each takes a value's
-/// worth of the spread with it.
+/// The mean of `values` (beside `periods`, NaN no data, any unit) over `window`: a step across an end of it counts by the time that it has
+/// inside. Its error comes from the spread of `about`, one beside each value: the values less what is no chance in them, such as their seasons,
+/// of which `means` were taken off: each takes a value's worth of the spread with it.
 pub fn mean_over_time(
     periods: &[Period],
     values: &[f64],
     (about, means): (&[f64], usize),
+    window: Period,
 ) -> MeanOverTime {
     let (mut sum, mut seconds, mut count) = (0.0, 0.0, 0);
     for (period, value) in periods.iter().zip(values).filter(|(_, v)| !v.is_nan()) {
-        sum += value * period.seconds();
-        seconds += period.seconds();
+        let inside_ms = period.end.min(window.end).ms() - period.start.max(window.start).ms();
+        let inside_s = inside_ms.max(0) as f64 / 1000.0;
+        sum += value * inside_s;
+        seconds += inside_s;
         count += 1;
     }
     let present: Vec<f64> = about.iter().copied().filter(|v| !v.is_nan()).collect();
@@ -77,16 +80,34 @@ mod tests {
             .collect()
     }
 
+    /// A window that holds all steps of these tests.
+    fn all() -> Period {
+        let [start, end] = ["2001", "2011"].map(|year| year.parse().unwrap());
+        Period::new(start, end).unwrap()
+    }
+
     #[test]
     fn steps_count_by_their_length() {
         let year = months(12);
         let values: Vec<f64> = (0..12).map(|m| if m == 1 { 1.0 } else { 0.0 }).collect();
-        let found = mean_over_time(&year, &values, (&values, 1));
+        let found = mean_over_time(&year, &values, (&values, 1), all());
         assert!((found.mean.unwrap() - 28.0 / 365.0).abs() < 1e-15);
         assert_eq!(
-            mean_over_time(&year, &[f64::NAN; 12], (&[f64::NAN; 12], 1)).mean,
+            mean_over_time(&year, &[f64::NAN; 12], (&[f64::NAN; 12], 1), all()).mean,
             None
         );
+    }
+
+    #[test]
+    fn a_step_across_the_end_of_the_period_counts_by_its_time_inside() {
+        let year = months(12);
+        let values: Vec<f64> = (0..12).map(f64::from).collect();
+        // Ten days of February, all of March, one day of April.
+        let [start, end] = ["2001-02-19", "2001-04-02"].map(|day| day.parse().unwrap());
+        let window = Period::new(start, end).unwrap();
+        let found = mean_over_time(&year[1..4], &values[1..4], (&values[1..4], 1), window);
+        let mean = (10.0 * 1.0 + 31.0 * 2.0 + 3.0) / 42.0;
+        assert!((found.mean.unwrap() - mean).abs() < 1e-12, "{found:?}");
     }
 
     /// By hand: 1, 1, _, 2, 2 about 1.5 has two pairs of 0.25, of four of five steps: 4/5 of the variance. Side by side it would
@@ -96,7 +117,7 @@ mod tests {
         let year = months(12);
         let periods = [year[0], year[1], year[3], year[4]];
         let values = [1.0, 1.0, 2.0, 2.0];
-        let found = mean_over_time(&periods, &values, (&values, 1));
+        let found = mean_over_time(&periods, &values, (&values, 1), all());
         let expected = 4.0 * (1.0 - 0.8) / (1.0 + 0.8);
         assert!((found.effective_count.unwrap() - expected).abs() < 1e-12);
     }
@@ -115,8 +136,8 @@ mod tests {
         let a = [1.0, 3.0, 0.5, 2.5, 1.5, 3.5, 0.0, 4.0];
         let b = [2.0, 5.0, 3.0, 6.0, 2.5, 4.5];
         let (a, b) = (
-            mean_over_time(&days, &a, (&a, 1)),
-            mean_over_time(&days[..6], &b, (&b, 1)),
+            mean_over_time(&days, &a, (&a, 1), all()),
+            mean_over_time(&days[..6], &b, (&b, 1), all()),
         );
         let (error, p_value) = welch(&a, &b).unwrap();
         assert!(
@@ -139,7 +160,7 @@ mod tests {
                 .map(|_| (0..12).map(|_| next()).sum::<f64>())
                 .collect();
             let about = crate::analysis::climatology::deseasonalised(&periods, &values);
-            mean_over_time(&periods, &values, (&about, 12))
+            mean_over_time(&periods, &values, (&about, 12), all())
         };
         let (mut found, mut squares, mut told) = (0, 0.0, 0.0);
         for _ in 0..1000 {
@@ -156,7 +177,10 @@ mod tests {
         // Of twelve values less twelve means nothing is left that tells a spread.
         let few = months(12);
         let values: Vec<f64> = (0..12).map(f64::from).collect();
-        assert_eq!(mean_over_time(&few, &values, (&values, 12)).variance, None);
+        assert_eq!(
+            mean_over_time(&few, &values, (&values, 12), all()).variance,
+            None
+        );
     }
 
     /// Error and chance.

@@ -43,6 +43,7 @@ fn made_of(read: ReadSeries, options: &AnalysisOptions) -> SeriesAnalysis {
         values,
         left_out: left_out_count,
         notes,
+        window: _,
     } = read;
     let mut answer = SeriesAnalysis {
         start: extent.start,

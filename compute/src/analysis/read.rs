@@ -2,7 +2,7 @@
 
 use contract::analysis::{SeriesPlace, SeriesQuery};
 use contract::cited::Cited;
-use contract::manifest::{Manifest, ManifestId};
+use contract::manifest::{Manifest, ManifestId, Step};
 use contract::quantity::Quantity;
 use contract::series::RegionValue;
 use contract::statistics::{MinCoverage, Statistic, StatisticsAnswer};
@@ -24,7 +24,9 @@ pub type Version<'a> = (&'a Manifest, &'a ManifestId);
 pub(crate) struct ReadSeries {
     pub(crate) cited: Cited,
     pub(crate) place: SeriesPlace,
-    /// In the order of time.
+    /// The asked period; all that the version covers where its ends are left open.
+    pub(crate) window: Period,
+    /// In the order of time; steps across the ends of the asked period are whole, at places, over regions and along lines.
     pub(crate) periods: Vec<Period>,
     /// Beside them, in the unit that people read, NaN no data.
     pub(crate) values: Vec<f64>,
@@ -44,6 +46,14 @@ impl ReadSeries {
         Period {
             start: first.start,
             end: last.end,
+        }
+    }
+
+    /// What of a step lies in the asked period.
+    pub(crate) fn within(&self, step: Period) -> Period {
+        Period {
+            start: step.start.max(self.window.start),
+            end: step.end.min(self.window.end),
         }
     }
 
@@ -104,11 +114,12 @@ impl CoveredMean {
         }
     }
 
-    fn along_line(answer: &StatisticsAnswer) -> Vec<Self> {
+    /// Of native steps that reach into the asked period, each of which has a row that ends with the period.
+    fn along_line(answer: &StatisticsAnswer, steps: &[&Step]) -> Vec<Self> {
         let means = answer.series(Statistic::Mean).into_iter();
-        let rows = means.zip(&answer.rows);
-        rows.map(|((period, mean), row)| Self {
-            period,
+        let rows = means.zip(&answer.rows).zip(steps);
+        rows.map(|(((_cut, mean), row), step)| Self {
+            period: step.period,
             mean,
             coverage_percent: row.coverage_percent,
         })
@@ -127,7 +138,7 @@ pub(crate) async fn series(
     least: MinCoverage,
 ) -> Result<ReadSeries, ComputeError> {
     let (from, to) = query.window();
-    let (window, _inside) = manifest.steps_inside(from, to)?;
+    let (window, inside) = manifest.steps_inside(from, to)?;
     let mut read = ReadSeries {
         cited: Cited::of(manifest, id.clone()),
         place: SeriesPlace {
@@ -135,6 +146,7 @@ pub(crate) async fn series(
             line: None,
             cell: None,
         },
+        window,
         periods: vec![],
         values: vec![],
         left_out: 0,
@@ -163,7 +175,7 @@ pub(crate) async fn series(
         }
         SeriesQuery::Line(asked) => {
             let found = statistics_of(engine, &asked.statistics(), manifest, id.clone()).await?;
-            let means = CoveredMean::along_line(&found);
+            let means = CoveredMean::along_line(&found, &inside);
             read.place.line = Some(found.geometry);
             read.notes = found.notes;
             read.take_means(&means, least, "line");

@@ -198,12 +198,13 @@ fn months_of_year(series: &ReadSeries) -> usize {
     months.len()
 }
 
-/// Share of its time with data that each calendar month has.
+/// Share of its time with data in the asked period that each calendar month has.
 fn shares_of_months(series: &ReadSeries) -> [f64; 12] {
     let mut shares = [0.0; 12];
     let here = series.periods.iter().zip(&series.values);
     for (period, _) in here.filter(|(_, value)| !value.is_nan()) {
-        for part in TimeStep::Month.bins(*period, []).unwrap_or_default() {
+        let inside = series.within(*period);
+        for part in TimeStep::Month.bins(inside, []).unwrap_or_default() {
             shares[CalendarBins::Month.of(part)] += part.seconds();
         }
     }
@@ -235,16 +236,16 @@ fn of_seasons(sides: [(&ReadSeries, &MeanOverTime); 2]) -> Vec<String> {
 
 /// Mean of a side, its error by the spread about the mean of each month where there are two years of them.
 fn of_side(series: &ReadSeries) -> MeanOverTime {
-    let (periods, values) = (&series.periods, &series.values);
+    let (periods, values, window) = (&series.periods, &series.values, series.window);
     if !has_seasons(series) {
-        return mean_over_time(periods, values, (values, 1));
+        return mean_over_time(periods, values, (values, 1), window);
     }
     let about = deseasonalised(periods, values);
-    mean_over_time(periods, values, (&about, months_of_year(series)))
+    mean_over_time(periods, values, (&about, months_of_year(series)), window)
 }
 
 fn side(series: ReadSeries, mean: &MeanOverTime) -> DifferenceSide {
-    let extent = series.extent();
+    let extent = series.within(series.extent());
     DifferenceSide {
         cited: series.cited,
         start: extent.start,

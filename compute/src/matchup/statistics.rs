@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::analysis::correlation::varies;
+
 /// Difference of gridded and observed values over all pairs, unit of the values; none where it is not defined.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Statistics {
@@ -43,9 +45,13 @@ impl Statistics {
 }
 
 fn correlation(
-    pairs: impl Iterator<Item = (f64, f64)>,
+    pairs: impl Iterator<Item = (f64, f64)> + Clone,
     (mean_a, mean_b): (f64, f64),
 ) -> Option<f64> {
+    let is_told = varies(pairs.clone().map(|(a, _)| a)) && varies(pairs.clone().map(|(_, b)| b));
+    if !is_told {
+        return None;
+    }
     let (mut aa, mut bb, mut ab) = (0.0, 0.0, 0.0);
     for (a, b) in pairs {
         let (a, b) = (a - mean_a, b - mean_b);
@@ -84,5 +90,16 @@ mod tests {
         assert_eq!((one.bias, one.correlation), (Some(1.0), None));
         assert_eq!(of(&[(1.0, 2.0), (1.0, 3.0)]).correlation, None);
         assert_eq!(of(&[(1.0, -2.0), (2.0, -4.0)]).correlation, Some(-1.0));
+    }
+
+    /// The mean of many equal values lies beside them by rounding.
+    #[test]
+    fn a_side_of_equal_values_has_no_correlation_whatever_they_are() {
+        let freezing = f64::from(271.35f32) - 273.15;
+        let drift = |at: u32| f64::from(at) * 0.01;
+        let constant: Vec<(f64, f64)> = (0..840).map(|at| (drift(at), freezing)).collect();
+        assert_eq!(of(&constant).correlation, None);
+        let turned: Vec<(f64, f64)> = constant.iter().map(|(a, b)| (*b, *a)).collect();
+        assert_eq!(of(&turned).correlation, None);
     }
 }

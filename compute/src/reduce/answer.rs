@@ -61,20 +61,8 @@ pub fn statistics_of<'a>(
         let periods: Vec<Period> = manifest.steps.iter().map(|step| step.period).collect();
         let bins = query.step.bins(window, periods.iter().copied())?;
         let weighed = Weighed::of(engine, manifest, query).await?;
-        let first = periods.partition_point(|period| period.end <= window.start);
-        let mut asked = Reduction {
-            engine,
-            manifest,
-            id: &id,
-            values: opened(engine, manifest, &id).await?,
-            weighed: &weighed,
-            steps: first as u32..(first + inside.len()) as u32,
-            scale: Scale::of_all(),
-        };
-        asked.scale = match Scale::of(manifest.quantity) {
-            Some(own) => own,
-            None => asked.own_scale().await?,
-        };
+        let inside = (window, inside.len());
+        let asked = Reduction::of(engine, (manifest, &id), &weighed, inside).await?;
         let sums = asked.accumulated(wanted(query)).await?;
         let bins = bin_sums(&periods, &bins, &sums).ok_or_else(too_large)?;
         let percentiles = asked.percentiles(query, &bins, &periods).await?;
@@ -157,7 +145,7 @@ fn unit_of(statistic: Statistic, quantity: Quantity, size_unit: &str) -> String 
 }
 
 /// What every pass over the values is about.
-struct Reduction<'a> {
+pub(super) struct Reduction<'a> {
     engine: &'a Engine,
     manifest: &'a Manifest,
     /// The name of the version, which is costly to compute.
@@ -166,14 +154,40 @@ struct Reduction<'a> {
     values: Option<Values>,
     weighed: &'a Weighed,
     /// Steps that reach into the period.
-    steps: Range<u32>,
+    pub(super) steps: Range<u32>,
     /// What values are summed in.
-    scale: Scale,
+    pub(super) scale: Scale,
 }
 
-impl Reduction<'_> {
+impl<'a> Reduction<'a> {
+    /// About the steps of a version that reach into a period, and how many do. Values are summed in the scale of their quantity, or in one of their own
+    /// where it says nothing of them, which a pass over them finds.
+    pub(super) async fn of(
+        engine: &'a Engine,
+        (manifest, id): (&'a Manifest, &'a ManifestId),
+        weighed: &'a Weighed,
+        (window, count): (Period, usize),
+    ) -> Result<Self, ComputeError> {
+        let steps = &manifest.steps;
+        let first = steps.partition_point(|step| step.period.end <= window.start);
+        let mut own = Self {
+            engine,
+            manifest,
+            id,
+            values: opened(engine, manifest, id).await?,
+            weighed,
+            steps: first as u32..(first + count) as u32,
+            scale: Scale::of_all(),
+        };
+        own.scale = match Scale::of(manifest.quantity) {
+            Some(of_quantity) => of_quantity,
+            None => own.own_scale().await?,
+        };
+        Ok(own)
+    }
+
     /// Passes over the values. Sums of whole runs are remembered, and not asked for a second time.
-    async fn accumulated(&self, wanted: Wanted) -> Result<Accumulated, ComputeError> {
+    pub(super) async fn accumulated(&self, wanted: Wanted) -> Result<Accumulated, ComputeError> {
         let weighed = self.weighed;
         let version = Version {
             store: self.engine.store(),

@@ -1,7 +1,9 @@
 //! Text in, the one statement that may be asked out; whatever would write or read elsewhere is refused with the reason.
 
 use datafusion::sql::parser::{DFParserBuilder, Statement};
-use datafusion::sql::sqlparser::ast::{SetExpr, Statement as Ansi};
+use datafusion::sql::sqlparser::ast::{
+    DescribeAlias, SetExpr, ShowStatementOptions, Statement as Ansi,
+};
 
 use super::told::told;
 use crate::ComputeError;
@@ -46,7 +48,49 @@ pub(super) fn statement(text: &str) -> Result<Statement, ComputeError> {
         return refused("it is more than one statement; ask one at a time");
     }
     check(&statement)?;
-    Ok(statement)
+    described(statement)
+}
+
+/// What SHOW COLUMNS asks as DESCRIBE, which finds a table by whichever name: the engine looks for columns of the very name, and none of ours has `_`.
+///
+/// # Errors
+/// `Sql`: it asks for some of the columns, or more of them.
+fn described(statement: Statement) -> Result<Statement, ComputeError> {
+    let Statement::Statement(own) = &statement else {
+        return Ok(statement);
+    };
+    let Ansi::ShowColumns {
+        extended,
+        full,
+        show_options,
+    } = own.as_ref()
+    else {
+        return Ok(statement);
+    };
+    let ShowStatementOptions {
+        show_in,
+        starts_with,
+        limit,
+        limit_from,
+        filter_position,
+    } = show_options;
+    let is_of_some = starts_with.is_some() || filter_position.is_some();
+    let is_cut = limit.is_some() || limit_from.is_some();
+    let table = show_in.as_ref().and_then(|it| it.parent_name.clone());
+    match table {
+        Some(table_name) if !(*extended || *full || is_of_some || is_cut) => {
+            let describe = Ansi::ExplainTable {
+                describe_alias: DescribeAlias::Describe,
+                hive_format: None,
+                has_table_keyword: false,
+                table_name,
+            };
+            Ok(Statement::Statement(Box::new(describe)))
+        }
+        _ => refused(
+            "SHOW COLUMNS takes FROM and a table alone: ask DESCRIBE and the table, or choose from information_schema.columns",
+        ),
+    }
 }
 
 /// What most who write the name of a product for the first time need to know.

@@ -6,7 +6,9 @@ use std::sync::Arc;
 use contract::geometry::AskedGeometry;
 use contract::manifest::Manifest;
 use contract::region::AskedRegion;
-use contract::statistics::{Statistic, Statistics, StatisticsAnswer, StatisticsQuery};
+use contract::statistics::{
+    Statistic, StatisticNote, Statistics, StatisticsAnswer, StatisticsQuery,
+};
 use contract::time::TimeStep;
 use datafusion::arrow::array::{ArrayRef, Float64Array, RecordBatch, StringArray, UInt32Array};
 use datafusion::arrow::datatypes::{DataType, Field, Schema, SchemaRef};
@@ -30,7 +32,7 @@ pub(super) static KIND: Kind = Kind {
 pub(super) const ABOUT: [&str; 4] = [
     "stats",
     "stats('product', 'region'|'LON,LAT'|'LON,LAT;LON,LAT;...', 'step', 'statistics') as a table",
-    "the rows of `fluxglobe stats` in the unit that people read; step native and statistics mean if left out",
+    "the rows of `fluxglobe stats` in the units that people read, which units says of each statistic and unit where they have one; step native and statistics mean if left out",
     "",
 ];
 
@@ -63,7 +65,9 @@ impl Question for StatisticsQuery {
         fields.extend([
             Field::new("coverage_percent", DataType::Float64, false),
             Field::new("step_count", DataType::UInt32, false),
-            Field::new("unit", DataType::Utf8, false),
+            // A sum is of the unit times an area, a count of 1: which unit that is only the version says, and a plan knows none.
+            Field::new("unit", DataType::Utf8, true),
+            Field::new("units", DataType::Utf8, false),
         ]);
         Arc::new(Schema::new(fields))
     }
@@ -106,7 +110,23 @@ fn columns(answer: &StatisticsAnswer, statistics: &Statistics) -> Vec<ArrayRef> 
     columns.push(Arc::new(Float64Array::from_iter_values(coverage)));
     let steps = rows.iter().map(|row| row.step_count);
     columns.push(Arc::new(UInt32Array::from_iter_values(steps)));
-    let units = rows.iter().map(|_row| &answer.cited.unit);
+    let unit = std::iter::repeat_n(shared_unit(answer), rows.len());
+    columns.push(Arc::new(unit.collect::<StringArray>()));
+    let units = std::iter::repeat_n(units(answer), rows.len());
     columns.push(Arc::new(StringArray::from_iter_values(units)));
     columns
+}
+
+/// The unit that all statistics have; none where they have several.
+fn shared_unit(answer: &StatisticsAnswer) -> Option<&str> {
+    let mut units = answer.statistics.iter().map(|one| one.unit.as_str());
+    let first = units.next()?;
+    units.all(|unit| unit == first).then_some(first)
+}
+
+/// Each statistic with its unit, such as `mean: °C; std: K`.
+fn units(answer: &StatisticsAnswer) -> String {
+    let of_one = |one: &StatisticNote| format!("{}: {}", one.name, one.unit);
+    let all: Vec<String> = answer.statistics.iter().map(of_one).collect();
+    all.join("; ")
 }

@@ -1,14 +1,19 @@
 //! The series of a product over a region: its mean over the cells that hold data, by area, for every step.
 
 use contract::cited::Cited;
-use contract::manifest::Manifest;
+use contract::geometry::{AskedGeometry, Geometry};
+use contract::manifest::{Manifest, ManifestId};
+use contract::quantity::Quantity;
+use contract::region::Cells;
 use contract::series::{RegionSeries, RegionSeriesQuery, RegionValue};
+use contract::statistics::StatisticsQuery;
 use futures::future::BoxFuture;
 
 use crate::budget::Measure;
 use crate::budget::fixed::{AREA_DECIMALS, MASS_DECIMALS};
 use crate::budget::over_region::{AskedArea, over_region};
 use crate::budget::rows::{StepSum, coverage_percent};
+use crate::reduce::{RegionMeans, StepMean, means_over_region};
 use crate::summed::check_averaged;
 use crate::{ComputeError, Engine, catalogue};
 
@@ -31,37 +36,84 @@ pub fn region_series_of<'a>(
 ) -> BoxFuture<'a, Result<RegionSeries, ComputeError>> {
     Box::pin(async move {
         check_averaged(engine.store(), manifest).await?;
-        let (_window, steps) = manifest.steps_inside(query.from, query.to)?;
-        let area = AskedArea {
-            region: &query.region,
-            earth: query.earth,
-            ocean: query.ocean.as_deref(),
+        let id = manifest.id();
+        let means = match manifest.quantity {
+            // Sums as budgets have them are in steps of 1e-9 of the unit: nothing of a concentration of 1e-17, too many of a heat of 1e11.
+            Quantity::Open(_) => in_own_steps(engine, query, manifest, &id).await?,
+            _ => in_steps_of_masses(engine, query, manifest).await?,
         };
-        let over = over_region(engine, manifest, &steps, area, Measure::Mean).await?;
-        let (sums, extent) = (over.sums, over.extent);
         let display = manifest.quantity.display();
-        let value = |sum: &StepSum| {
-            let (mean, area_m2) = mean_and_area(sum);
-            RegionValue {
-                start: sum.period.start,
-                end: sum.period.end,
-                mid: sum.period.mid(),
-                mean: mean.map(|mean| mean * display.factor + display.offset),
-                area_m2,
-                coverage_percent: coverage_percent(m2(sum.sea_area_steps()), extent.ocean_m2),
-            }
+        let value = |step: &StepMean| RegionValue {
+            start: step.period.start,
+            end: step.period.end,
+            mid: step.period.mid(),
+            mean: step.mean.map(|mean| mean * display.factor + display.offset),
+            area_m2: step.area_m2,
+            coverage_percent: coverage_percent(step.sea_m2, means.ocean_m2),
         };
-        let series = sums.steps.iter().map(value).collect();
         Ok(RegionSeries {
-            cited: Cited::of(manifest, manifest.id()),
+            series: means.steps.iter().map(value).collect(),
+            cited: Cited::of(manifest, id),
             region: query.region_name.clone(),
-            region_area_m2: extent.area_m2,
-            ocean_area_m2: extent.ocean_m2,
-            ocean_source: over.ocean_source,
-            notes: extent.notes,
+            region_area_m2: means.area_m2,
+            ocean_area_m2: means.ocean_m2,
+            ocean_source: means.ocean_source,
+            notes: means.notes,
             earth: query.earth,
-            series,
         })
+    })
+}
+
+/// Means of a quantity whose values may be of any size.
+async fn in_own_steps(
+    engine: &Engine,
+    query: &RegionSeriesQuery,
+    manifest: &Manifest,
+    id: &ManifestId,
+) -> Result<RegionMeans, ComputeError> {
+    let geometry = AskedGeometry {
+        geometry: Geometry::Region(query.region.clone()),
+        name: query.region_name.clone(),
+    };
+    let asked = StatisticsQuery {
+        from: query.from,
+        to: query.to,
+        earth: query.earth,
+        cells: Cells::Whole,
+        ocean: query.ocean.clone(),
+        ..StatisticsQuery::new(query.product.clone(), geometry)
+    };
+    means_over_region(engine, &asked, manifest, id).await
+}
+
+/// Means made of exact sums, which may be stored.
+async fn in_steps_of_masses(
+    engine: &Engine,
+    query: &RegionSeriesQuery,
+    manifest: &Manifest,
+) -> Result<RegionMeans, ComputeError> {
+    let (_window, steps) = manifest.steps_inside(query.from, query.to)?;
+    let area = AskedArea {
+        region: &query.region,
+        earth: query.earth,
+        ocean: query.ocean.as_deref(),
+    };
+    let over = over_region(engine, manifest, &steps, area, Measure::Mean).await?;
+    let mean = |sum: &StepSum| {
+        let (mean, area_m2) = mean_and_area(sum);
+        StepMean {
+            period: sum.period,
+            mean,
+            area_m2,
+            sea_m2: m2(sum.sea_area_steps()),
+        }
+    };
+    Ok(RegionMeans {
+        area_m2: over.extent.area_m2,
+        ocean_m2: over.extent.ocean_m2,
+        ocean_source: over.ocean_source,
+        notes: over.extent.notes,
+        steps: over.sums.steps.iter().map(mean).collect(),
     })
 }
 

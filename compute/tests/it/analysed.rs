@@ -5,7 +5,7 @@ use compute::reduce::statistics_of;
 use compute::{ComputeError, Engine, ErrorClass};
 use contract::analysis::{
     Along, AnalysisOptions, AnalysisPart, CorrelationQuery, Difference, HovmollerQuery,
-    LineSeriesQuery, SeriesQuery,
+    HovmollerRow, LineSeriesQuery, SeriesQuery,
 };
 use contract::earth::Earth;
 use contract::grid::{Grid, LonLatDeg};
@@ -426,6 +426,48 @@ async fn periods_versions_and_products_are_compared() {
     }
 }
 
+/// Of a year of seasons the winters at its ends count by the months that it has of them, wherever values are of.
+#[tokio::test(flavor = "multi_thread")]
+async fn steps_across_the_ends_of_a_period_count_by_their_time_in_it_in_every_kind_of_place() {
+    let (_folder, store) = folder_store();
+    let seasons = TimeStep::Season
+        .whole_bins(Period::new("2000-12".parse().unwrap(), "2003-12".parse().unwrap()).unwrap());
+    assert_eq!(seasons.len(), 12);
+    // Winters stand out, m s⁻¹.
+    let value = |at: usize| (at + if at.is_multiple_of(4) { 20 } else { 0 }) as f32;
+    let field = |(at, period): (usize, Period)| (period, vec![value(at); GRID.cell_count()]);
+    let steps: Vec<_> = seasons.into_iter().enumerate().map(field).collect();
+    let manifest = wind(&store, "wind", &steps).await;
+    let engine = Engine::in_process(store.clone(), parts(2));
+    let days = [(0, 59.0), (1, 92.0), (2, 92.0), (3, 91.0), (4, 31.0)];
+    let sum: f64 = days
+        .iter()
+        .map(|(at, days)| f64::from(value(*at)) * days)
+        .sum();
+    let mean = sum / 365.0;
+    let mut found = vec![];
+    for place in [
+        region("wind", "-131,-16,-130,-15"),
+        cell("wind", -130.5, -15.5),
+        line("wind", "-130.8,-15.2;-130.2,-15.8"),
+    ] {
+        let [of, minus] = ["2001/2001", "2002/2002"].map(|year| place.in_years(year.parse().ok()));
+        let told = differ(&engine, (&manifest, &of), (&manifest, &minus)).await;
+        let told = told.unwrap();
+        assert!((told.of.mean.unwrap() - mean).abs() < 1e-4, "{told:?}");
+        let is_year = ["2001-01-01T00:00:00Z", "2002-01-01T00:00:00Z"];
+        assert_eq!([told.of.start, told.of.end].map(|t| t.to_string()), is_year);
+        found.push(told);
+    }
+    for told in &found[1..] {
+        let numbers = |own: &Difference| [own.difference, own.standard_error, own.p_value];
+        for (a, b) in numbers(told).into_iter().zip(numbers(&found[0])) {
+            assert!((a.unwrap() - b.unwrap()).abs() < 1e-4, "{found:?}");
+        }
+        assert_eq!(told.of.count, 5);
+    }
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn the_profile_of_bands_has_their_mean_spread_and_coverage_over_the_whole_period() {
     let (_folder, store) = folder_store();
@@ -475,6 +517,69 @@ async fn the_profile_of_bands_has_their_mean_spread_and_coverage_over_the_whole_
     };
     let found = analysis::hovmoller(&engine, (&manifest, &id), &monthly).await;
     assert!(found.unwrap().rows.iter().all(|row| row.stds.is_empty()));
+}
+
+/// Weeks lie across the ends of years: rows are of the asked years, and of what is asked of a year all is there.
+#[tokio::test(flavor = "multi_thread")]
+async fn rows_of_bands_end_with_the_asked_period_and_with_what_steps_cover() {
+    let (_folder, store) = folder_store();
+    let day = |text: &str| text.parse().unwrap();
+    let weeks =
+        TimeStep::Week.whole_bins(Period::new(day("2000-12-01"), day("2003-02-01")).unwrap());
+    // 1 January 2001 is a Monday: no week lies in that year and the one before, those of 31 December 2001 and 30 December 2002 in two.
+    let year = |week: &Period| week.mid().year_month().0;
+    let field = |week: Period| (week, vec![(year(&week) - 1998) as f32; GRID.cell_count()]);
+    let steps: Vec<_> = weeks.iter().copied().map(field).collect();
+    let manifest = wind(&store, "wind", &steps).await;
+    let id = manifest.id();
+    let engine = Engine::local(store);
+    let query = |from: &str, to: &str, step: TimeStep| HovmollerQuery {
+        product: product("wind"),
+        along: Along::Lat,
+        band_deg: Some(9.0),
+        region: None,
+        step,
+        from: from.parse().ok(),
+        to: to.parse().ok(),
+        earth: Earth::Wgs84,
+        min_coverage: MinCoverage::default(),
+    };
+    let of = async |query: HovmollerQuery| {
+        let found = analysis::hovmoller(&engine, (&manifest, &id), &query).await;
+        let rows = found.unwrap().rows;
+        let is_full = |row: &HovmollerRow| {
+            let percent = row.coverage_percent.iter();
+            percent.fold(100.0, |least: f64, own| least.min(*own)) > 100.0 - 1e-9
+        };
+        assert!(rows.iter().all(is_full), "{rows:?}");
+        let ends =
+            |row: &HovmollerRow| [row.start, row.end].map(|time| time.to_string()[..10].to_owned());
+        let ends: Vec<[String; 2]> = rows.iter().map(ends).collect();
+        let means: Vec<f64> = rows.iter().map(|row| row.means[0].unwrap()).collect();
+        (ends, means)
+    };
+    let (ends, means) = of(query("2001", "2003", TimeStep::Year)).await;
+    assert_eq!(
+        ends,
+        [["2001-01-01", "2002-01-01"], ["2002-01-01", "2003-01-01"]]
+    );
+    // Of 31 December 2001 a day of 4, of the week of 30 December 2002 two days of 5.
+    let by_hand = [
+        (364.0 * 3.0 + 4.0) / 365.0,
+        (363.0 * 4.0 + 2.0 * 5.0) / 365.0,
+    ];
+    let apart = means.iter().zip(by_hand).map(|(a, b)| (a - b).abs());
+    assert!(apart.fold(0.0, f64::max) < 1e-9, "{means:?} {by_hand:?}");
+    let (ends, _) = of(query("2001-03-01", "2002", TimeStep::Year)).await;
+    assert_eq!(ends, [["2001-03-01", "2002-01-01"]]);
+    let (ends, _) = of(query("2003-01-01", "2004", TimeStep::Year)).await;
+    assert_eq!(ends, [["2003-01-01", "2003-02-03"]]);
+    let (ends, means) = of(query("2001-12-29", "2002-01-02", TimeStep::Native)).await;
+    assert_eq!(
+        ends,
+        [["2001-12-29", "2001-12-31"], ["2001-12-31", "2002-01-02"]]
+    );
+    assert!((means[1] - 4.0).abs() < 1e-9);
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -374,6 +374,9 @@ const REFUSED: &[(&str, &str)] = &[
         "not found; products are sst-test",
     ),
     ("SELECT depth FROM sst_test", "depth"),
+    ("SHOW FULL COLUMNS FROM sst_test", "ask DESCRIBE"),
+    ("SHOW COLUMNS FROM sst_test LIKE 'v%'", "ask DESCRIBE"),
+    ("SHOW COLUMNS FROM atlantis", "not found"),
     ("CHOOSE 1", "CHOOSE"),
     ("SELECT repeat('x', 2000000000)", "repeat is left out"),
     ("SELECT lpad('x', 2000000000)", "lpad is left out"),
@@ -578,6 +581,10 @@ async fn a_version_is_named_and_one_question_reads_one_version() {
     );
     let columns = texts(&sql, "DESCRIBE sst_test").await;
     assert_eq!(columns.len(), 6);
+    for table in ["sst_test", "\"sst-test\"", "\"sst_test@2\""] {
+        let shown = texts(&sql, &format!("SHOW COLUMNS FROM {table}")).await;
+        assert_eq!(shown, columns, "{table}");
+    }
     assert_eq!(
         texts(&sql, "SHOW TABLES")
             .await
@@ -619,6 +626,19 @@ async fn functions_of_the_field_are_those_of_expressions_and_statistics_those_of
         let numbers = ["mean", "max"].map(|name| own.values[name].unwrap().to_string());
         assert_eq!(row[1..3], numbers);
         assert_eq!(row[3], "°C");
+    }
+    // What has several units says that of each statistic.
+    for (asked, unit, units) in [
+        ("mean,max", "°C", "mean: °C; max: °C"),
+        ("std", "K", "std: K"),
+        ("sum", "°C m²", "sum: °C m²"),
+        ("count,coverage", "", "count: 1; coverage: %"),
+        ("mean,std", "", "mean: °C; std: K"),
+    ] {
+        let asked = format!(
+            "SELECT DISTINCT unit, units FROM stats('sst_test', '162,-10,170,10', 'month', '{asked}')"
+        );
+        assert_eq!(texts(&sql, &asked).await, [[unit, units]], "{asked}");
     }
     // The mean by area of whole cells is that of the reduction, up to the digits that floats have.
     let plain = "SELECT mean_weighted(value, area_km2) - 273.15 FROM sst_test

@@ -41,7 +41,7 @@ pub struct DifferenceSide {
     /// What it is to be cited with.
     #[serde(flatten)]
     pub cited: Cited,
-    /// First instant that was read.
+    /// First instant that counts.
     pub start: TimeMs,
     /// First instant after it.
     pub end: TimeMs,
@@ -50,7 +50,7 @@ pub struct DifferenceSide {
     /// Steps that hold data over less than the least coverage, and were left out.
     #[serde(default)]
     pub left_out_count: u64,
-    /// Mean over time, each step by its length; none without data.
+    /// Mean over time, each step by its time in the asked period; none without data.
     #[schema(required)]
     pub mean: Option<f64>,
     /// Effective number of steps.

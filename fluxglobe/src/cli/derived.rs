@@ -77,13 +77,15 @@ pub(crate) struct DeriveStatistic {
     /// where it was there with all cells. All cells of the source if absent, without data outside the region.
     #[arg(long, requires = "region")]
     pub(crate) crop: bool,
-    /// Years of the climatology, both part of it: 1991/2020. All that the product covers if absent.
+    /// Years of the climatology, both part of it: 1991/2020; of climatology and anomaly alone. If absent those of --from and --to, of anomalies
+    /// all that the product covers.
     #[arg(long, value_name = "FIRST/LAST")]
     pub(crate) base: Option<BasePeriod>,
     /// Parts of the year of climatology and anomaly.
     #[arg(long, default_value_t, value_name = "month|season")]
     pub(crate) bins: CalendarBins,
-    /// First instant of the steps that are read, or of anomalies that are written. The product's first if absent.
+    /// First instant of the steps that are read, or of anomalies that are written; not of a climatology with a --base, which says it. The
+    /// product's first if absent.
     #[arg(long)]
     pub(crate) from: Option<TimeMs>,
     /// First instant after them. The product's end if absent.
@@ -107,13 +109,15 @@ impl DeriveStatistic {
     /// What is derived, in a region or everywhere.
     ///
     /// # Errors
-    /// A name that would be too long; a correlation without a second product, or one that nothing is correlated with.
+    /// A name that would be too long; a correlation without a second product, or one that nothing is correlated with; a base period, or a
+    /// period, that nothing is made of.
     pub(crate) fn asked(&self, region: Option<&AskedRegion>) -> Result<Vec<MapOptions>> {
         let correlation = self.with.clone().map(|with| MapCorrelation {
             lag_steps: self.lag.unwrap_or_default(),
             deseasonalise: self.deseasonalise,
             ..MapCorrelation::new(with)
         });
+        self.check_base()?;
         let is_any_of_two = self.statistic.iter().any(|one| one.is_of_two());
         match &self.with {
             None if is_any_of_two => {
@@ -146,7 +150,7 @@ impl DeriveStatistic {
                 name => name.clone(),
             };
             Ok(MapOptions {
-                base: self.base,
+                base: self.base.filter(|_| statistic.has_bins()),
                 bins: self.bins,
                 from: self.from,
                 to: self.to,
@@ -167,6 +171,26 @@ impl DeriveStatistic {
             })
         };
         self.statistic.iter().map(one).collect()
+    }
+
+    /// Is something made of the base period, and of the period beside it?
+    fn check_base(&self) -> Result<()> {
+        let Some(base) = self.base else {
+            return Ok(());
+        };
+        if !self.statistic.iter().any(|one| one.has_bins()) {
+            bail!(
+                "nothing is made of the base period {base}: --base is for climatology and anomaly; which steps others are made of say --from and --to"
+            );
+        }
+        let is_climatology = self.statistic.contains(&MapStatistic::Climatology);
+        if is_climatology && (self.from.is_some() || self.to.is_some()) {
+            bail!(
+                "a climatology is made of all steps in its base period {base}, and of --from and --to nothing: leave out either, and ask for \
+                 other statistics of that period by a command of their own"
+            );
+        }
+        Ok(())
     }
 }
 
@@ -236,5 +260,32 @@ mod tests {
             .map(|one| one.target(&"sst".parse().unwrap()).unwrap());
         let names: Vec<String> = names.map(|name| name.to_string()).collect();
         assert_eq!(names, ["both-correlation", "both-correlation-p-value"]);
+    }
+
+    #[test]
+    fn a_base_period_is_of_what_has_a_climatology_and_alone_says_what_that_is_made_of() {
+        for (words, reason) in [
+            (
+                "mean,trend --base 1991/2020",
+                "is for climatology and anomaly",
+            ),
+            (
+                "climatology --base 1991/2020 --from 2000",
+                "leave out either",
+            ),
+            (
+                "anomaly,climatology --base 1991/2020 --to 2000",
+                "leave out either",
+            ),
+        ] {
+            let refused = asked(words).unwrap_err().to_string();
+            assert!(refused.contains(reason), "{words}: {refused}");
+        }
+        let base: Option<BasePeriod> = "1991/2020".parse().ok();
+        let all = asked("mean,climatology,anomaly --base 1991/2020").unwrap();
+        let bases = all.iter().map(|one| one.base);
+        assert_eq!(bases.collect::<Vec<_>>(), [None, base, base]);
+        assert!(asked("anomaly --base 1991/2020 --from 2000").is_ok());
+        assert!(asked("climatology --from 2000 --to 2010").is_ok());
     }
 }

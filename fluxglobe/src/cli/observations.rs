@@ -55,7 +55,7 @@ pub(crate) struct ObservationsAsked {
 /// How a step of the product is chosen for an observation's time.
 #[derive(Debug, Clone, Copy, ValueEnum)]
 pub(crate) enum MatchTime {
-    /// The step that the time lies in or is nearest to.
+    /// The step that the time lies in.
     Nearest,
     /// Interpolated between the two steps around it.
     Linear,

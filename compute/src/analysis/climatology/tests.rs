@@ -108,6 +108,24 @@ fn mean_and_spread_are_those_of_an_independent_library() {
     assert!((spread(&shifted).unwrap() - 0.975_734_324_119_208).abs() < 1e-9);
 }
 
+/// The mean of many equal values lies beside them by rounding: what is measured in spreads of that is not anything.
+#[test]
+fn equal_values_have_no_spread_whatever_they_are() {
+    let freezing = f64::from(271.35f32) - 273.15;
+    for value in [freezing, 0.1, -1e-17, 3e13, 0.0] {
+        assert_eq!(spread(&[value; 840]), Some(0.0), "{value}");
+    }
+    let periods = months(1951, 840);
+    let mut values = vec![freezing; 840];
+    values[839] = -1.5;
+    let base = "1951/2019".parse().ok();
+    let normal = climatology(&periods, &values, CalendarBins::Month, base).unwrap();
+    let found = anomalies(&periods, &values, &normal);
+    let last = &found.rows[839];
+    assert!((last.anomaly.unwrap() - 0.3).abs() < 1e-6, "{last:?}");
+    assert_eq!(last.standardised, None);
+}
+
 #[test]
 fn a_series_of_seasons_alone_leaves_nothing() {
     let periods = months(2001, 36);
