@@ -65,6 +65,9 @@ impl Sql {
             functions.retain(|it| !LARGE.contains(&it.name()));
             functions.extend(number_functions().map(Arc::new));
         }
+        if let Some(functions) = builder.higher_order_functions() {
+            functions.retain(|it| !LARGE.contains(&it.name()));
+        }
         if let Some(functions) = builder.aggregate_functions() {
             functions.push(Arc::new(AggregateUDF::from(MeanWeighted::new())));
         }
@@ -230,7 +233,7 @@ impl Sql {
             reason.to_lowercase().contains(&quoted)
         });
         let advice = if let Some(name) = large {
-            format!("{name} is left out: its values are as large as a number says")
+            format!("{name} is left out: its values may be larger than any limit of memory sees")
         } else if reason.contains("table '") && reason.contains("not found") {
             let names: Vec<_> = tables.products().iter().map(ToString::to_string).collect();
             let names = if names.is_empty() {
