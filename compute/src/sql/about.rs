@@ -28,7 +28,8 @@ pub(super) async fn products(
     pinned: &Pinned,
     products: &[ProductId],
 ) -> Result<Arc<dyn TableProvider>, ComputeError> {
-    let read = |product: ProductId| async move { pinned.version(&Named::newest(product)).await };
+    let read =
+        move |product: ProductId| async move { pinned.version(&Named::newest(product)).await };
     let found = stream::iter(products.to_vec()).map(read).buffered(AT_ONCE);
     let found: Vec<Option<Arc<Manifest>>> = found.try_collect().await?;
     let all: Vec<Arc<Manifest>> = found.into_iter().flatten().collect();

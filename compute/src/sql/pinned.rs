@@ -34,7 +34,10 @@ impl Pinned {
             let mut found = self.found.lock().unwrap_or_else(PoisonError::into_inner);
             Arc::clone(found.entry(named.clone()).or_default())
         };
-        let read = || async { Ok(named.manifest(&self.engine).await?.map(Arc::new)) };
+        let read = || async {
+            let manifest = named.manifest(&self.engine).await;
+            manifest.map(|found| found.map(Arc::new))
+        };
         own.get_or_try_init(read).await.cloned()
     }
 
