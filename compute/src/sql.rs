@@ -12,6 +12,7 @@ mod columns;
 mod limits;
 mod mean_weighted;
 mod named;
+mod pinned;
 mod place;
 mod product_table;
 mod reads;

@@ -10,11 +10,12 @@ use datafusion::arrow::array::{
 };
 use datafusion::catalog::{MemTable, TableProvider};
 use futures::{StreamExt as _, TryStreamExt as _, stream};
-use storage::manifests;
 
+use super::named::Named;
+use super::pinned::Pinned;
 use super::{analysis, budget, mean_weighted, statistics};
+use crate::ComputeError;
 use crate::expression::function::{ALL, Function};
-use crate::{ComputeError, Engine};
 
 pub(super) const PRODUCTS: &str = "products";
 pub(super) const FUNCTIONS: &str = "functions";
@@ -22,20 +23,18 @@ pub(super) const FUNCTIONS: &str = "functions";
 /// Manifests that are read at a time.
 const AT_ONCE: usize = 8;
 
-/// A row a product, as it is now.
+/// A row a product, as the question reads it.
 pub(super) async fn products(
-    engine: &Engine,
+    pinned: &Pinned,
     products: &[ProductId],
 ) -> Result<Arc<dyn TableProvider>, ComputeError> {
-    let read = |product: ProductId| {
-        let store = engine.store().clone();
-        async move { manifests::latest(&store, &product).await }
-    };
+    let read =
+        move |product: ProductId| async move { pinned.version(&Named::newest(product)).await };
     let found = stream::iter(products.to_vec()).map(read).buffered(AT_ONCE);
-    let found: Vec<Option<Manifest>> = found.try_collect().await?;
-    let all: Vec<Manifest> = found.into_iter().flatten().collect();
+    let found: Vec<Option<Arc<Manifest>>> = found.try_collect().await?;
+    let all: Vec<Arc<Manifest>> = found.into_iter().flatten().collect();
     let instants = |at: fn(&Manifest) -> Option<i64>| -> ArrayRef {
-        let own = all.iter().map(at);
+        let own = all.iter().map(|it| at(it));
         Arc::new(
             own.collect::<TimestampMillisecondArray>()
                 .with_timezone("UTC"),
@@ -43,10 +42,12 @@ pub(super) async fn products(
     };
     let edge = |number: usize| numbers(&all, move |it| it.grid.shown_bounds_deg()[number]);
     let sides = |side: fn(&Manifest) -> u32| -> ArrayRef {
-        Arc::new(UInt32Array::from_iter_values(all.iter().map(side)))
+        Arc::new(UInt32Array::from_iter_values(all.iter().map(|it| side(it))))
     };
     let counts = |count: fn(&Manifest) -> u64| -> ArrayRef {
-        Arc::new(UInt64Array::from_iter_values(all.iter().map(count)))
+        Arc::new(UInt64Array::from_iter_values(
+            all.iter().map(|it| count(it)),
+        ))
     };
     let synthetic: BooleanArray = all.iter().map(|it| Some(it.synthetic)).collect();
     let columns: Vec<(&str, ArrayRef)> = vec![

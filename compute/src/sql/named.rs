@@ -8,7 +8,7 @@ use storage::manifests;
 use crate::{ComputeError, Engine};
 
 /// A product, and perhaps one of its versions.
-#[derive(Debug, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Named {
     pub(super) product: ProductId,
     number: Option<u64>,
@@ -37,25 +37,19 @@ impl Named {
         })
     }
 
+    /// The newest version of a product.
+    pub(super) fn newest(product: ProductId) -> Self {
+        Self {
+            product,
+            number: None,
+            digest: None,
+        }
+    }
+
     /// A mask and a code or what it means, `name:3`, the name as of [`Self::of`]: the cells where that mask has this code.
     pub(super) fn with_code(text: &str) -> Option<(Self, MaskCode)> {
         let (mask, code) = MaskCode::split(text)?;
         Some((Self::of(mask)?, code))
-    }
-
-    /// The version that must be there.
-    ///
-    /// # Errors
-    /// `UnknownProduct` if it is not.
-    pub(super) async fn required(&self, engine: &Engine) -> Result<Manifest, ComputeError> {
-        if let Some(manifest) = self.manifest(engine).await? {
-            return Ok(manifest);
-        }
-        self.check_version(engine).await?;
-        Err(ComputeError::UnknownProduct {
-            product: self.product.to_string(),
-            known: manifests::products(engine.store()).await?,
-        })
     }
 
     /// # Errors
@@ -81,6 +75,7 @@ impl Named {
         })
     }
 
+    /// The version that is there now.
     pub(super) async fn manifest(&self, engine: &Engine) -> Result<Option<Manifest>, ComputeError> {
         let store = engine.store();
         let manifest = match self.number {

@@ -22,6 +22,7 @@ use tokio::time::{Instant, timeout_at};
 
 use super::limits::SqlLimits;
 use super::mean_weighted::MeanWeighted;
+use super::pinned::Pinned;
 use super::rows::BATCH_ROWS;
 use super::running::{Rows, Turn};
 use super::statement::{LARGE, statement};
@@ -45,7 +46,7 @@ const TOLD_CONSUMERS: NonZeroUsize = NonZeroUsize::new(3).expect("it is not 0");
 pub struct Sql {
     engine: Engine,
     limits: SqlLimits,
-    /// Settings and functions; sessions add tables and memory.
+    /// Settings and functions; sessions add tables, functions that stand for tables, and memory.
     state: SessionState,
 }
 
@@ -64,19 +65,17 @@ impl Sql {
             functions.retain(|it| !LARGE.contains(&it.name()));
             functions.extend(number_functions().map(Arc::new));
         }
+        if let Some(functions) = builder.higher_order_functions() {
+            functions.retain(|it| !LARGE.contains(&it.name()));
+        }
         if let Some(functions) = builder.aggregate_functions() {
             functions.push(Arc::new(AggregateUDF::from(MeanWeighted::new())));
         }
         let builder = builder.with_physical_optimizer_rule(Arc::new(Yielding));
-        let mut state = builder.with_config(config()).build();
-        for kind in [&statistics::KIND, &budget::KIND, &analysis::KIND] {
-            let function = Arc::new(AnswerFunction::new(kind, engine));
-            state.register_udtf(kind.name, function);
-        }
         Ok(Self {
             engine: engine.clone(),
             limits,
-            state,
+            state: builder.with_config(config()).build(),
         })
     }
 
@@ -134,7 +133,7 @@ impl Sql {
         &self,
         with_columns: bool,
     ) -> Result<Vec<(String, SchemaRef)>, ComputeError> {
-        let tables = Tables::of(&self.engine).await?;
+        let tables = Tables::of(&self.engine, Pinned::new(&self.engine)).await?;
         let mut listed = vec![];
         for name in tables.table_names() {
             let columns = if with_columns {
@@ -198,7 +197,8 @@ impl Sql {
 
     /// A session for one question.
     async fn context(&self) -> Result<(SessionContext, Arc<Tables>), ComputeError> {
-        let tables = Arc::new(Tables::of(&self.engine).await?);
+        let pinned = Pinned::new(&self.engine);
+        let tables = Arc::new(Tables::of(&self.engine, Arc::clone(&pinned)).await?);
         let failed = || ComputeError::engine("starting a session");
         let catalog = MemoryCatalogProvider::new();
         let registered = catalog.register_schema(SCHEMA, Arc::clone(&tables) as _);
@@ -212,10 +212,14 @@ impl Sql {
             .with_memory_pool(Arc::new(TrackConsumersPool::new(pool, TOLD_CONSUMERS)))
             .with_disk_manager_builder(disk)
             .build_arc();
-        let state = SessionStateBuilder::new_from_existing(self.state.clone())
+        let mut state = SessionStateBuilder::new_from_existing(self.state.clone())
             .with_catalog_list(Arc::new(catalogs))
             .with_runtime_env(runtime.map_err(failed())?)
             .build();
+        for kind in [&statistics::KIND, &budget::KIND, &analysis::KIND] {
+            let function = Arc::new(AnswerFunction::new(kind, &self.engine, &pinned));
+            state.register_udtf(kind.name, function);
+        }
         Ok((SessionContext::new_with_state(state), tables))
     }
 
@@ -229,7 +233,7 @@ impl Sql {
             reason.to_lowercase().contains(&quoted)
         });
         let advice = if let Some(name) = large {
-            format!("{name} is left out: its values are as large as a number says")
+            format!("{name} is left out: its values may be larger than any limit of memory sees")
         } else if reason.contains("table '") && reason.contains("not found") {
             let names: Vec<_> = tables.products().iter().map(ToString::to_string).collect();
             let names = if names.is_empty() {

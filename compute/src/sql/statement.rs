@@ -13,8 +13,9 @@ const MAX_BYTES: usize = 256 << 10;
 /// What may be asked.
 const MAY: &str = "SELECT, WITH, VALUES, EXPLAIN, SHOW and DESCRIBE";
 
-/// Functions of the engine whose value is as large as a number says, which no limit of memory sees.
-pub(super) const LARGE: [&str; 9] = [
+/// Functions of the engine, and other names of theirs, whose value is as large as a number says, or as its arguments multiplied: one of a few hundred
+/// kilobytes of text may have gigabytes, which no limit of memory sees.
+pub(super) const LARGE: [&str; 24] = [
     "repeat",
     "lpad",
     "rpad",
@@ -24,6 +25,21 @@ pub(super) const LARGE: [&str; 9] = [
     "list_resize",
     "range",
     "generate_series",
+    "replace",
+    "regexp_replace",
+    "concat_ws",
+    "array_to_string",
+    "list_to_string",
+    "array_join",
+    "list_join",
+    "array_replace",
+    "list_replace",
+    "array_replace_n",
+    "list_replace_n",
+    "array_replace_all",
+    "list_replace_all",
+    "array_transform",
+    "list_transform",
 ];
 
 /// The statement of a text.

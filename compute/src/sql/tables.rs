@@ -15,6 +15,7 @@ use tokio::sync::Mutex;
 
 use super::about;
 use super::named::Named;
+use super::pinned::Pinned;
 use super::product_table::ProductTable;
 use super::version::{Version, external};
 use crate::{ComputeError, Engine};
@@ -22,6 +23,7 @@ use crate::{ComputeError, Engine};
 /// Tables of a session.
 pub(super) struct Tables {
     engine: Engine,
+    pinned: Arc<Pinned>,
     products: Vec<ProductId>,
     /// Those that were asked for.
     held: Mutex<BTreeMap<String, Arc<dyn TableProvider>>>,
@@ -34,8 +36,10 @@ impl std::fmt::Debug for Tables {
 }
 
 impl Tables {
-    pub(super) async fn of(engine: &Engine) -> Result<Self, ComputeError> {
+    /// Those of a question that reads these versions.
+    pub(super) async fn of(engine: &Engine, pinned: Arc<Pinned>) -> Result<Self, ComputeError> {
         Ok(Self {
+            pinned,
             products: manifests::products(engine.store()).await?,
             engine: engine.clone(),
             held: Mutex::default(),
@@ -50,7 +54,7 @@ impl Tables {
     async fn found(&self, name: &str) -> Result<Option<Arc<dyn TableProvider>>, ComputeError> {
         match name {
             about::PRODUCTS => {
-                return Ok(Some(about::products(&self.engine, &self.products).await?));
+                return Ok(Some(about::products(&self.pinned, &self.products).await?));
             }
             about::FUNCTIONS => return Ok(Some(about::functions()?)),
             _ => {}
@@ -58,7 +62,7 @@ impl Tables {
         let Some(named) = Named::of(name) else {
             return Ok(None);
         };
-        let manifest = named.manifest(&self.engine).await?;
+        let manifest = self.pinned.version(&named).await?;
         if manifest.is_none() {
             named.check_version(&self.engine).await?;
         }

@@ -17,7 +17,7 @@ pub(super) struct Version(Arc<Inner>);
 
 struct Inner {
     engine: Engine,
-    manifest: Manifest,
+    manifest: Arc<Manifest>,
     id: ManifestId,
     axes: Axes,
 }
@@ -29,7 +29,7 @@ impl std::fmt::Debug for Version {
 }
 
 impl Version {
-    pub(super) fn new(engine: &Engine, manifest: Manifest) -> Self {
+    pub(super) fn new(engine: &Engine, manifest: Arc<Manifest>) -> Self {
         Self(Arc::new(Inner {
             engine: engine.clone(),
             id: manifest.id(),

@@ -18,6 +18,7 @@ use datafusion::physical_plan::ExecutionPlan;
 use futures::future::BoxFuture;
 
 use super::named::Named;
+use super::pinned::Pinned;
 use super::version::external;
 use crate::region::mask;
 use crate::{ComputeError, Engine};
@@ -56,17 +57,21 @@ pub(super) struct Kind {
 /// A question, or why there is none.
 pub(super) type Asked = Result<Arc<dyn Question>, ComputeError>;
 
-/// A function that stands for the answers of a kind of questions.
+/// A function that stands for the answers of a kind of questions, about the versions that one question in SQL reads.
 pub(super) struct AnswerFunction {
     kind: &'static Kind,
     engine: Engine,
+    pinned: Arc<Pinned>,
 }
 
 impl AnswerFunction {
     /// Nothing is stored for a question.
-    pub(super) fn new(kind: &'static Kind, engine: &Engine) -> Self {
-        let engine = engine.storing_no_weights();
-        Self { kind, engine }
+    pub(super) fn new(kind: &'static Kind, engine: &Engine, pinned: &Arc<Pinned>) -> Self {
+        Self {
+            kind,
+            engine: engine.storing_no_weights(),
+            pinned: Arc::clone(pinned),
+        }
     }
 }
 
@@ -102,6 +107,7 @@ impl TableFunctionImpl for AnswerFunction {
         let question = (kind.asked)(&product, place, more).map_err(external)?;
         Ok(Arc::new(AnswerTable {
             engine: self.engine.clone(),
+            pinned: Arc::clone(&self.pinned),
             product,
             mask,
             question,
@@ -112,6 +118,7 @@ impl TableFunctionImpl for AnswerFunction {
 /// Rows that are worked out when they are read.
 struct AnswerTable {
     engine: Engine,
+    pinned: Arc<Pinned>,
     product: Named,
     /// Whose cells with this code the question is of, if it is.
     mask: Option<(Named, MaskCode)>,
@@ -121,11 +128,11 @@ struct AnswerTable {
 impl AnswerTable {
     async fn rows(&self) -> Result<RecordBatch, ComputeError> {
         let engine = &self.engine;
-        let manifest = self.product.required(engine).await?;
+        let manifest = self.pinned.required(&self.product).await?;
         let Some((named, code)) = &self.mask else {
             return self.question.rows(engine, &manifest).await;
         };
-        let codes = named.required(engine).await?;
+        let codes = self.pinned.required(named).await?;
         let region = mask::region(engine.store(), &codes, code).await?;
         self.question.over(region).rows(engine, &manifest).await
     }

@@ -382,6 +382,26 @@ const REFUSED: &[(&str, &str)] = &[
     ("SELECT lpad('x', 2000000000)", "lpad is left out"),
     ("SELECT range(0, 2000000000)", "range is left out"),
     (
+        "SELECT replace(replace('xxxx', 'x', 'xxxx'), 'x', 'xxxx')",
+        "replace is left out",
+    ),
+    (
+        "SELECT regexp_replace('xxxx', 'x', 'xxxx', 'g')",
+        "regexp_replace is left out",
+    ),
+    (
+        "SELECT concat_ws('xxxx', 'x', 'x')",
+        "concat_ws is left out",
+    ),
+    (
+        "SELECT array_replace_all(make_array(1, 1), 1, 2)",
+        "array_replace_all is left out",
+    ),
+    (
+        "SELECT list_to_string(make_array(1, 1), 'xxxx')",
+        "list_to_string is left out",
+    ),
+    (
         "SELECT mean_weighted(value, -1) FROM sst_test",
         "is no weight",
     ),

@@ -10,7 +10,7 @@ use contract::earth::Earth;
 use contract::geometry::{AskedGeometry, Sampling};
 use contract::grid::{Grid, LonLatDeg};
 use contract::manifest::Manifest;
-use contract::quantity::{OpenQuantity, OpenWords, Quantity};
+use contract::quantity::Quantity;
 use contract::statistics::{StatisticsAnswer, StatisticsQuery};
 use contract::time::{Period, TimeStep};
 use storage::Store;
@@ -184,15 +184,7 @@ async fn means_and_coverage_are_those_of_the_series_that_was_always_given() {
 #[tokio::test(flavor = "multi_thread")]
 async fn series_of_open_quantities_are_their_means_however_small_or_large_these_are() {
     let (_folder, store) = folder_store();
-    let words = OpenWords {
-        name: "deposition".to_owned(),
-        unit: "kg m-2 s-1".to_owned(),
-        title: "Deposition".to_owned(),
-        range: None,
-        flags: vec![],
-        is_standard_name: false,
-    };
-    let quantity = Quantity::Open(OpenQuantity::new(words).unwrap());
+    let quantity = Quantity::open("deposition", "kg m-2 s-1", "Deposition").unwrap();
     let of_one = wavy_year(&GRID);
     let engine = Engine::in_process(store.clone(), parts(2));
     let weights = weights::compute(&GRID, &POLYGON.parse().unwrap(), Earth::Wgs84).unwrap();
