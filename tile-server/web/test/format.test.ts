@@ -1,14 +1,17 @@
 //! Units and numbers as text: the signs a reader of a journal expects.
 import { describe, expect, it } from "vitest";
 import {
+  alikeText,
   areaText,
   chemistry,
   digitsFor,
+  exponentText,
   latText,
   lonText,
   numberText,
   titleText,
   unitText,
+  valueText,
   wrapLon,
 } from "../src/page/format";
 
@@ -57,8 +60,28 @@ describe("numbers", () => {
     expect([1404, 66, 4.8, 0.012].map((size) => digitsFor(size, 4))).toEqual([0, 2, 3, 5]);
   });
 
+  it("are no zeros, however small they are", () => {
+    expect([1.234e-5, -2e-5, 1.23e-6, -4e-11, 5e-324].map((value) => valueText(value, 3))).toEqual([
+      "0.0000123",
+      "−0.0000200",
+      "1.23e−6",
+      "−4e−11",
+      "4.94e−324",
+    ]);
+    expect([0, -0].map((value) => valueText(value))).toEqual(["0.00", "0.00"]);
+    expect([1, 2e9, 2.5e-9].map((value) => exponentText(value, 6))).toEqual(["1e0", "2e9", "2.5e−9"]);
+    expect(exponentText(3e-9, 1)).toBe("3e−9");
+  });
+
+  it("beside each other have the decimals of the largest", () => {
+    expect([27.03, -0.004, 0, null].map((value) => alikeText(value, 27.03))).toEqual(["27.03", "0.00", "0.00", "–"]);
+    expect([2.5e-7, -4e-9, 0, null].map((value) => alikeText(value, 2.5e-7))).toEqual(["2.5e−7", "−4e−9", "0", "–"]);
+    expect(alikeText(0, 0)).toBe("0.00");
+  });
+
   it("write areas in million square kilometres", () => {
     expect(areaText(334.1e12)).toBe("334.1 million km²");
+    expect(areaText(100)).toBe("1e−10 million km²");
   });
 });
 

@@ -2,7 +2,8 @@
 import { describe, expect, it } from "vitest";
 import { MODES } from "../src/api/words";
 import { underOpacity } from "../src/globe/fade";
-import { ticksOf } from "../src/look/legend";
+import { tickTexts, ticksOf } from "../src/look/legend";
+import { rowTexts } from "../src/panels/budget";
 import { budgetCsv, seriesCsv } from "../src/panels/csv";
 import { hasData, missingText, samplesOf, valueAt } from "../src/panels/series";
 import { decodeHash, encodeHash } from "../src/state/hash";
@@ -150,6 +151,24 @@ describe("legend ticks", () => {
     expect(ticksOf(-60, 60)).toEqual([-50, -25, 0, 25, 50]);
     expect(ticksOf(0, 1)).toEqual([0, 0.2, 0.4, 0.6000000000000001, 0.8, 1]);
     expect(ticksOf(5, 5)).toEqual([5]);
+  });
+
+  it("are written as the server's drawings have them", () => {
+    expect(tickTexts([-1, 0, 0.5])).toEqual(["−1.0", "0.0", "0.5"]);
+    expect(tickTexts([-20, 0, 20])).toEqual(["−20", "0", "20"]);
+    expect(tickTexts(ticksOf(0, 1))).toEqual(["0.0", "0.2", "0.4", "0.6", "0.8", "1.0"]);
+    expect(tickTexts([0, 2.5e-9])).toEqual(["0", "2.5e−9"]);
+    expect(tickTexts([0, 2e6])).toEqual(["0", "2e6"]);
+    expect(tickTexts([])).toEqual([]);
+  });
+});
+
+describe("the budget's rows", () => {
+  it("have the decimals of the largest, at least two, and none is zero that is not", () => {
+    expect(rowTexts([-117.034, 3.1])).toEqual(["−117.03", "3.10"]);
+    expect(rowTexts([0.00123, -0.0004])).toEqual(["0.001230", "−0.000400"]);
+    expect(rowTexts([3e-7, -1.5e-8])).toEqual(["3e−7", "−1.5e−8"]);
+    expect(rowTexts([])).toEqual([]);
   });
 });
 

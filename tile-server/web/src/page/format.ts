@@ -50,16 +50,37 @@ export function numberText(value: number | null | undefined, digits: number): st
   return value < 0 && !isZero ? MINUS + text : text;
 }
 
-/** Decimals that show about `significant` figures of numbers as large as `magnitude`, 0 to 6. */
+/** Numbers below this are written with an exponent: so many decimals nobody counts. */
+const LEAST_WRITTEN = 1e-5;
+/** Decimals of four figures of the least number that is written without an exponent. */
+const MOST_DECIMALS = 8;
+
+/** Decimals that show about `significant` figures of numbers as large as `magnitude`, 0 to 8. */
 export function digitsFor(magnitude: number, significant: number): number {
   if (!Number.isFinite(magnitude) || magnitude === 0) return 2;
   const leading = Math.floor(Math.log10(Math.abs(magnitude)));
-  return Math.min(6, Math.max(0, significant - 1 - leading));
+  return Math.min(MOST_DECIMALS, Math.max(0, significant - 1 - leading));
+}
+
+/** `2.5e−9`: at most `significant` figures and an exponent; zero is zero. */
+export function exponentText(value: number, significant: number): string {
+  if (value === 0) return "0";
+  const [figures = "", power] = value.toExponential(significant - 1).split("e");
+  const short = figures.includes(".") ? figures.replace(/\.?0+$/, "") : figures;
+  return `${short}e${Number(power)}`.replaceAll("-", MINUS);
+}
+
+/** One of several numbers of which the largest has about `significant` figures, and all the same decimals. */
+export function alikeText(value: number | null | undefined, largest: number, significant = 4): string {
+  const isTiny = largest !== 0 && Math.abs(largest) < LEAST_WRITTEN;
+  const isNumber = value !== null && value !== undefined && Number.isFinite(value);
+  if (isTiny && isNumber) return exponentText(value, significant);
+  return numberText(value, digitsFor(largest, significant));
 }
 
 /** A single value with about `significant` figures. */
 export function valueText(value: number | null | undefined, significant = 4): string {
-  return numberText(value, digitsFor(value ?? 0, significant));
+  return alikeText(value, value ?? 0, significant);
 }
 
 /** `12.50° N`; zero has no hemisphere. */
@@ -85,8 +106,7 @@ export function wrapLon(lonDeg: number): number {
 
 /** Area in m² as millions of km², the size people know oceans by. */
 export function areaText(areaM2: number): string {
-  const millionKm2 = areaM2 / 1e12;
-  return `${numberText(millionKm2, digitsFor(millionKm2, 4))} million km²`;
+  return `${valueText(areaM2 / 1e12)} million km²`;
 }
 
 /** A product's title that says so where the data are made up, once. */

@@ -4,7 +4,7 @@ import * as api from "../api/requests";
 import type { Budget, BudgetQuery, BudgetRow, Cells, Region } from "../api/types";
 import type { Bounds } from "../globe/box";
 import { el, icon, saveText } from "../page/dom";
-import { areaText, digitsFor, numberText, unitText } from "../page/format";
+import { alikeText, areaText, digitsFor, numberText, unitText, valueText } from "../page/format";
 import { DOWNLOAD } from "../page/icons";
 import type { Store } from "../state/store";
 import type { Step } from "../time/steps";
@@ -154,7 +154,7 @@ export class BudgetPanel {
     if (!row) return [el("p", { class: "problem" }, "The period holds no stored step.")];
     const isCarbon = total.unit === "Tg C";
     const petagrams = isCarbon
-      ? el("span", { class: "muted" }, `= ${numberText(row.budget_tg / TG_PER_PG, 3)} Pg C`)
+      ? el("span", { class: "muted" }, `= ${valueText(row.budget_tg / TG_PER_PG)} Pg C`)
       : null;
     return [
       el(
@@ -163,7 +163,7 @@ export class BudgetPanel {
         el(
           "strong",
           { id: "budget-total", "data-value": String(row.budget_tg) },
-          numberText(row.budget_tg, totalDigits(row.budget_tg)),
+          totalText(row.budget_tg),
         ),
         el("span", { class: "unit" }, unit),
         petagrams,
@@ -195,24 +195,30 @@ const CELLS: Record<Cells, string> = {
 function gapText(row: BudgetRow, unit: string, basis: string): string {
   if (row.gap_tg === null) return "There are gaps, and nothing beside them to estimate them from.";
   if (row.gap_area_m2 === 0) return "No gaps in the sea that could be estimated.";
-  const added = numberText(row.gap_tg, totalDigits(row.gap_tg));
-  return `Not in the budget: gaps of ${areaText(row.gap_area_m2)} would add ${added} ${unit} (${basis}).`;
+  return `Not in the budget: gaps of ${areaText(row.gap_area_m2)} would add ${totalText(row.gap_tg)} ${unit} (${basis}).`;
 }
 
 /** Four figures and at least one decimal: -1404.3, 27.03, 0.1234. */
-function totalDigits(total: number): number {
-  return Math.max(1, digitsFor(total, 4));
+function totalText(total: number): string {
+  return digitsFor(total, 4) < 1 ? numberText(total, 1) : valueText(total);
+}
+
+/** Rows with the decimals of the largest one, at least two: -117.03, 0.1234. */
+export function rowTexts(budgets: readonly number[]): string[] {
+  const largest = Math.max(0, ...budgets.map(Math.abs));
+  return budgets.map((budget) => (digitsFor(largest, 4) < 2 ? numberText(budget, 2) : alikeText(budget, largest)));
 }
 
 function table(answer: Budget, unit: string): HTMLElement {
   const head = el("tr", {}, ...["From", "To", unit, "Coverage"].map((title) => el("th", { scope: "col" }, title)));
-  const rows = answer.rows.map((row) =>
+  const budgets = rowTexts(answer.rows.map((row) => row.budget_tg));
+  const rows = answer.rows.map((row, index) =>
     el(
       "tr",
       {},
       el("td", {}, row.start.slice(0, 10)),
       el("td", {}, row.end.slice(0, 10)),
-      el("td", { class: "number" }, numberText(row.budget_tg, 2)),
+      el("td", { class: "number" }, budgets[index]),
       el("td", { class: "number" }, `${numberText(row.coverage_percent, 1)} %`),
     ),
   );

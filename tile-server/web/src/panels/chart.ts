@@ -141,7 +141,7 @@ export function dress(labelY: string): Omit<uPlot.Options, "width" | "height" | 
         labelSize: 20,
         labelGap: 2,
         size: 46,
-        values: (_plot, splits) => splits.map((value) => String(Number(value.toPrecision(6))).replace("-", "−")),
+        values: (_plot, splits) => splits.map((value) => String(Number(value.toPrecision(6))).replaceAll("-", "−")),
       },
     ],
   };

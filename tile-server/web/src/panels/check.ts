@@ -1,14 +1,14 @@
 //! The check table: what the paper says, what another program makes of its grid, what we say.
 import type { Check, CheckPaper, CheckRow } from "../api/types";
 import { el } from "../page/dom";
-import { chemistry, digitsFor, numberText, unitText } from "../page/format";
+import { alikeText, chemistry, numberText, unitText } from "../page/format";
 
 export function drawCheck(body: HTMLElement, check: Check): void {
   const head = ["What", "Paper", "Independent", "Fluxglobe", "Against the paper"].map((title, column) =>
     el("th", { scope: "col", class: column > 0 && column < 4 ? "number" : "" }, title),
   );
-  const digits = digitsByUnit(check.rows);
-  const rows = check.rows.map((row) => rowView(row, digits.get(row.unit) ?? 0));
+  const largest = largestByUnit(check.rows);
+  const rows = check.rows.map((row) => rowView(row, largest.get(row.unit) ?? 0));
   body.replaceChildren(
     el("p", { class: "muted" }, "Budgets by three hands, positive out of the sea."),
     el(
@@ -22,12 +22,12 @@ export function drawCheck(body: HTMLElement, check: Check): void {
 }
 
 /** Rows of one unit get the same decimals, else two equal numbers look different. */
-function digitsByUnit(rows: readonly CheckRow[]): Map<string, number> {
+function largestByUnit(rows: readonly CheckRow[]): Map<string, number> {
   const largest = new Map<string, number>();
   for (const { unit, independent, ours } of rows) {
     largest.set(unit, Math.max(largest.get(unit) ?? 0, Math.abs(independent), Math.abs(ours)));
   }
-  return new Map([...largest].map(([unit, magnitude]) => [unit, digitsFor(magnitude, 4)]));
+  return largest;
 }
 
 /** A printed number with the decimals and the uncertainty that the paper gives it. */
@@ -51,7 +51,7 @@ export function verdictText(row: CheckRow): string {
   return texts.join("; ");
 }
 
-function rowView(row: CheckRow, digits: number): HTMLElement {
+function rowView(row: CheckRow, largest: number): HTMLElement {
   return el(
     "tr",
     {},
@@ -62,8 +62,8 @@ function rowView(row: CheckRow, digits: number): HTMLElement {
       el("span", { class: "period" }, `${row.period}, ${unitText(row.unit)}`),
     ),
     el("td", { class: "number" }, statedText(row.paper)),
-    el("td", { class: "number" }, numberText(row.independent, digits)),
-    el("td", { class: "number" }, numberText(row.ours, digits)),
+    el("td", { class: "number" }, alikeText(row.independent, largest)),
+    el("td", { class: "number" }, alikeText(row.ours, largest)),
     el("td", {}, verdictText(row)),
   );
 }
