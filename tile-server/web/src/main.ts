@@ -97,7 +97,7 @@ const view = new ViewDialog(
   store,
   () => inventory.product?.modes ?? [],
   () => inventory.product?.synthetic ?? false,
-  (mode, timeMs) => inventory.viewIn(mode, timeMs),
+  (mode) => inventory.viewIn(mode),
   () => rangeOf(inventory.steps),
 );
 const controls = new Controls(byId("controls"), store, () => view.open());

@@ -3,26 +3,7 @@ import { afterEach, beforeEach, expect, it, vi } from "vitest";
 import type { Legend } from "../src/api/types";
 import { type Coloured, LegendCard } from "../src/look/legend-card";
 import { USUAL } from "../src/look/look";
-
-/** What a legend is built of: texts are all that is looked at. */
-class PaperElement {
-  readonly style: Record<string, string> = {};
-  #children: (PaperElement | string)[] = [];
-
-  setAttribute(): void {}
-
-  append(...children: (PaperElement | string)[]): void {
-    this.#children.push(...children);
-  }
-
-  replaceChildren(...children: (PaperElement | string)[]): void {
-    this.#children = children;
-  }
-
-  get text(): string {
-    return this.#children.map((child) => (typeof child === "string" ? child : child.text)).join(" ");
-  }
-}
+import { paperDocument, PaperElement } from "./paper-page";
 
 function legend(high: number): Legend {
   return { low: 0, high, unit: "mg m-3", label: "Chlorophyll", stops: [], ticks: [0, high] };
@@ -32,7 +13,7 @@ const asked: string[] = [];
 
 beforeEach(() => {
   asked.length = 0;
-  vi.stubGlobal("document", { baseURI: "http://host/", createElement: () => new PaperElement() });
+  vi.stubGlobal("document", paperDocument());
   vi.stubGlobal("fetch", (url: string) => {
     asked.push(new URL(url).pathname + new URL(url).search);
     return Promise.resolve(Response.json(legend(7)));

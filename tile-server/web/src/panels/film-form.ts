@@ -1,15 +1,15 @@
 //! "Save a film" of the rendered view: a period, a length and a rate in, frames asked for one by one, a WebM file out.
 import { getPicture } from "../api/client";
-import { type FilmPlan, frameCount, instants, problemOf } from "../film/plan";
+import { type Coverage, daysOf, type FilmPlan, frameCount, instants, problemOf } from "../film/plan";
 import { el, icon } from "../page/dom";
 import { DOWNLOAD } from "../page/icons";
-import { toIso } from "../time/steps";
 
 /** A view of which only the instant is open. */
 export interface FilmView {
   readonly name: string;
   readonly width: number;
   readonly height: number;
+  readonly coverage: Coverage;
   addressAt(timeMs: number): string;
 }
 
@@ -27,6 +27,8 @@ export class FilmForm {
   readonly #progress = el("progress", { id: "film-progress", max: "1", hidden: true });
   readonly #says = el("output", { id: "film-says", class: "muted" });
   readonly #save = el("a", { class: "button", id: "film-save", hidden: true }, icon(DOWNLOAD), "Save the film");
+  /** The days that were offered last: whoever typed none of his own is offered those of another product. */
+  #offered = ["", ""];
   #url: string | undefined;
   #making: AbortController | undefined;
 
@@ -53,10 +55,11 @@ export class FilmForm {
   }
 
   /** The period that a film shows unless another is typed. */
-  offer(range: { startMs: number; endMs: number } | undefined): void {
-    if (!range || this.#from.value) return;
-    this.#from.value = toIso(range.startMs).slice(0, 10);
-    this.#to.value = toIso(range.endMs - 1).slice(0, 10);
+  offer(coverage: Coverage | undefined): void {
+    const [first, last] = this.#offered;
+    if (!coverage || this.#from.value !== first || this.#to.value !== last) return;
+    this.#offered = daysOf(coverage);
+    [this.#from.value, this.#to.value] = daysOf(coverage);
   }
 
   stop(): void {
@@ -65,10 +68,10 @@ export class FilmForm {
 
   async #make(): Promise<void> {
     const plan = this.#plan();
-    const problem = problemOf(plan);
     const view = this.#view();
+    const problem = view ? problemOf(plan, view.coverage) : "There is nothing to film.";
     if (problem !== undefined || !view) {
-      this.#tell(problem ?? "There is nothing to film.", true);
+      this.#tell(problem ?? "", true);
       return;
     }
     this.stop();

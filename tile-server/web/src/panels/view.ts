@@ -7,17 +7,14 @@ import type { LayerSpec } from "../globe/layer";
 import { byId, el, icon } from "../page/dom";
 import { latText, lonText } from "../page/format";
 import { CLOSE, DOWNLOAD } from "../page/icons";
+import type { Coverage } from "../film/plan";
 import { FilmForm, type FilmView } from "./film-form";
 import type { CameraView } from "../state/camera";
 import type { Store } from "../state/store";
 import { viewOf } from "../stream/view";
-import { formatInstant } from "../time/steps";
+import { formatInstant, toIso } from "../time/steps";
 
-type SpecIn = (mode: Mode, timeMs?: number) => LayerSpec | undefined;
-interface Range {
-  readonly startMs: number;
-  readonly endMs: number;
-}
+type SpecIn = (mode: Mode) => LayerSpec | undefined;
 
 /** The longer side. The first is enough for a slide, and a few seconds' work where the server has no graphics chip. */
 const LONG_SIDES_PX = [1024, 1920, 2560, 3840, MOST_SIDE_PX];
@@ -27,7 +24,7 @@ export class ViewDialog {
   readonly #offered: () => readonly Mode[];
   readonly #isSynthetic: () => boolean;
   readonly #specIn: SpecIn;
-  readonly #range: () => Range | undefined;
+  readonly #coverage: () => Coverage | undefined;
   readonly #film = new FilmForm(() => this.#filmView());
   readonly #cancel = el("button", { type: "button", id: "view-cancel" }, "Cancel");
   readonly #dialog = el("dialog", { class: "view-dialog", "aria-labelledby": "view-title" });
@@ -44,13 +41,13 @@ export class ViewDialog {
     offered: () => readonly Mode[],
     isSynthetic: () => boolean,
     specIn: SpecIn,
-    range: () => Range | undefined,
+    coverage: () => Coverage | undefined,
   ) {
     this.#store = store;
     this.#offered = offered;
     this.#isSynthetic = isSynthetic;
     this.#specIn = specIn;
-    this.#range = range;
+    this.#coverage = coverage;
     this.#cancel.addEventListener("click", () => this.#asked?.abort());
     const close = el(
       "button",
@@ -78,7 +75,7 @@ export class ViewDialog {
     // The image is there for the volume; another mode is a choice away.
     this.#mode.value = offered.includes("volume") ? "volume" : (offered[0] ?? "map");
     this.#offerSizes();
-    this.#film.offer(this.#range());
+    this.#film.offer(this.#coverage());
     this.#dialog.showModal();
     void this.#render();
   }
@@ -119,18 +116,18 @@ export class ViewDialog {
     }
   }
 
-  /** What the dialog shows, at any instant. */
+  /** What the dialog shows, at any instant: all of one version, whatever comes while frames are drawn. */
   #filmView(): FilmView | undefined {
     const { camera } = this.#store.state;
     const mode = this.#mode.value as Mode;
-    const first = this.#specIn(mode);
-    if (!first) return undefined;
+    const spec = this.#specIn(mode);
+    const coverage = this.#coverage();
+    if (!spec || !coverage) return undefined;
     // Encoders halve the colours' resolution.
     const size = imageSize(Number(this.#size.value));
     const even = { width: size.width & ~1, height: size.height & ~1 };
-    const addressAt = (timeMs: number) =>
-      globeUrl(first.product, mode, viewOf(this.#specIn(mode, timeMs) ?? first, camera, even));
-    return { ...even, name: `${first.product}-${mode}`, addressAt };
+    const addressAt = (timeMs: number) => globeUrl(spec.product, mode, viewOf(specAt(spec, coverage, timeMs), camera, even));
+    return { ...even, coverage, name: `${spec.product}-${mode}`, addressAt };
   }
 
   /** The size that was chosen stays, in the shape that the window has now. */
@@ -154,6 +151,11 @@ export class ViewDialog {
     this.#save.download = name;
     this.#save.hidden = false;
   }
+}
+
+/** The same picture at another instant; of the first and the last day of what there is there may be less than the whole. */
+export function specAt(spec: LayerSpec, { startMs, endMs }: Coverage, timeMs: number): LayerSpec {
+  return { ...spec, timeIso: toIso(Math.min(Math.max(timeMs, startMs), endMs)) };
 }
 
 /** The globe's shape in the window, so that the image shows what the globe shows. */

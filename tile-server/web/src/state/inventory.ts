@@ -46,9 +46,9 @@ export class Inventory {
     return this.catalogue.lookIn(mode, this.#store.state);
   }
 
-  /** The picture at the instant shown or another, in any of the product's modes. */
-  viewIn(mode: Mode, timeMs = this.#store.state.timeMs): LayerSpec | undefined {
-    return this.catalogue.layerAt({ ...this.#store.state, mode }, timeMs);
+  /** The picture at the instant shown, in any of the product's modes. */
+  viewIn(mode: Mode): LayerSpec | undefined {
+    return this.catalogue.layerAt({ ...this.#store.state, mode }, this.#store.state.timeMs);
   }
 
   /** An address may name a palette or a relief that is not here. */
