@@ -1,6 +1,7 @@
 //! When a busy server is asked again: its header and the clock in, a pause out, and what becomes of it when nobody waits any more.
 import { afterEach, beforeEach, describe, expect, it, vi } from "vitest";
-import { MOST_TIMES, pauseMs, waited } from "../src/api/again";
+import { askedAgain, MOST_TIMES, pauseMs, waited } from "../src/api/again";
+import { getPicture } from "../src/api/client";
 
 const NOW_MS = Date.UTC(2026, 0, 2, 3, 4, 5);
 
@@ -60,5 +61,59 @@ describe("waiting", () => {
     expect(await waiting).toBe(false);
     expect(await waited(1000, gone.signal)).toBe(false);
     expect(vi.getTimerCount()).toBe(0);
+  });
+});
+
+describe("a picture that others wait for", () => {
+  beforeEach(() => void vi.useFakeTimers());
+  afterEach(() => {
+    vi.useRealTimers();
+    vi.unstubAllGlobals();
+  });
+
+  /** A server that refuses so many times. */
+  function refusing(count: number, headers: Record<string, string>): { asked: () => number } {
+    let asked = 0;
+    vi.stubGlobal("fetch", () => {
+      asked += 1;
+      const isRefused = asked <= count;
+      return Promise.resolve(
+        isRefused ? Response.json({ error: "planted: too much to do" }, { status: 503, headers }) : new Response("picture"),
+      );
+    });
+    return { asked: () => asked };
+  }
+
+  const ask = (signal: AbortSignal) => askedAgain(() => getPicture("http://host/globe", signal), signal);
+
+  it("is asked for again when the server says, and comes", async () => {
+    const server = refusing(2, { "Retry-After": "1" });
+    const come = ask(new AbortController().signal);
+    await vi.advanceTimersByTimeAsync(999);
+    expect(server.asked()).toBe(1);
+    await vi.advanceTimersByTimeAsync(10_000);
+    expect(await (await come).text()).toBe("picture");
+    expect(server.asked()).toBe(3);
+  });
+
+  it("fails where the server refuses for good, or as often as a tile would be", async () => {
+    const once = refusing(1, {});
+    await expect(ask(new AbortController().signal)).rejects.toThrow("too much to do");
+    expect(once.asked()).toBe(1);
+    const always = refusing(Number.POSITIVE_INFINITY, { "Retry-After": "1" });
+    const failed = expect(ask(new AbortController().signal)).rejects.toThrow("too much to do");
+    await vi.advanceTimersByTimeAsync(300_000);
+    await failed;
+    expect(always.asked()).toBe(1 + MOST_TIMES);
+  });
+
+  it("is waited for no longer when nobody wants it", async () => {
+    const server = refusing(Number.POSITIVE_INFINITY, { "Retry-After": "5" });
+    const gone = new AbortController();
+    const failed = expect(ask(gone.signal)).rejects.toThrow("too much to do");
+    await vi.advanceTimersByTimeAsync(0);
+    gone.abort();
+    await failed;
+    expect(server.asked()).toBe(1);
   });
 });

@@ -1,4 +1,5 @@
 //! When a server that has too much to do is asked again: what its refusal says in, a pause or none out.
+import { ApiError } from "./client";
 
 /** A tile that did not come. */
 export interface TileFailure {
@@ -49,6 +50,19 @@ export function waited(pauseMs: number, signal: AbortSignal): Promise<boolean> {
     };
     signal.addEventListener("abort", giveUp, { once: true });
   });
+}
+
+/** Asks for a picture that others wait for: again where the server has too much to do and says when to come, as often as for a tile. */
+export async function askedAgain<T>(ask: () => Promise<T>, signal: AbortSignal): Promise<T> {
+  for (let times = 0; ; times += 1) {
+    try {
+      return await ask();
+    } catch (error) {
+      const isRefused = error instanceof ApiError && error.kind === "refused" && times < MOST_TIMES;
+      const pause = isRefused ? pauseMs(error.retryAfter, times) : undefined;
+      if (pause === undefined || !(await waited(pause, signal))) throw error;
+    }
+  }
 }
 
 function readMs(text: string, nowMs: number): number | undefined {

@@ -7,6 +7,8 @@ export class ApiError extends Error {
     readonly kind: "refused" | "unreachable",
     readonly status: number,
     message: string,
+    /** When a refused question may be asked again, as the header of that name says it. */
+    readonly retryAfter?: string,
   ) {
     super(message);
     this.name = "ApiError";
@@ -35,7 +37,7 @@ export async function getJson<T>(url: string, signal?: AbortSignal): Promise<T> 
     const why = limit.aborted ? `no answer within ${ANSWER_LIMIT_MS / 1000} s` : "the connection failed";
     throw new ApiError("unreachable", 0, `The server does not answer (${why}).`);
   }
-  if (!response.ok) throw new ApiError("refused", response.status, await reasonOf(response));
+  if (!response.ok) throw await refusalOf(response);
   return (await response.json()) as T;
 }
 
@@ -51,7 +53,7 @@ export async function getPicture(url: string, signal: AbortSignal, onPart?: (sha
     if (signal.aborted) throw error;
     throw new ApiError("unreachable", 0, "The server does not answer.");
   }
-  if (!response.ok) throw new ApiError("refused", response.status, await reasonOf(response));
+  if (!response.ok) throw await refusalOf(response);
   const bytes = Number(response.headers.get("content-length") ?? 0);
   if (!onPart || !response.body || bytes === 0) return response.blob();
   const parts: Uint8Array<ArrayBuffer>[] = [];
@@ -64,6 +66,11 @@ export async function getPicture(url: string, signal: AbortSignal, onPart?: (sha
     onPart(come / bytes);
   }
   return new Blob(parts, { type: response.headers.get("content-type") ?? "" });
+}
+
+async function refusalOf(response: Response): Promise<ApiError> {
+  const retryAfter = response.headers.get("retry-after") ?? undefined;
+  return new ApiError("refused", response.status, await reasonOf(response), retryAfter);
 }
 
 /** Why an answer is none, in the server's words if it has any. */

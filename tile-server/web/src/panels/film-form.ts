@@ -1,4 +1,5 @@
 //! "Save a film" of the rendered view: a period, a length and a rate in, frames asked for one by one, a WebM file out.
+import { askedAgain } from "../api/again";
 import { getPicture } from "../api/client";
 import { type Coverage, daysOf, type FilmPlan, frameCount, instants, problemOf } from "../film/plan";
 import { el, icon } from "../page/dom";
@@ -87,7 +88,7 @@ export class FilmForm {
       const film = await makeFilm(
         { width: view.width, height: view.height, framesPerSecond: plan.framesPerSecond },
         times.length,
-        (i) => getPicture(view.addressAt(times[i] ?? plan.endMs), making.signal),
+        (i) => askedAgain(() => getPicture(view.addressAt(times[i] ?? plan.endMs), making.signal), making.signal),
         (done) => {
           this.#progress.value = done / times.length;
           const leftS = ((performance.now() - startedMs) / 1000 / done) * (times.length - done);
