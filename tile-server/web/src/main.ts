@@ -184,7 +184,7 @@ const viewer = new Viewer(
 );
 keepAddress(store, (change) => viewer.goTo(change));
 void viewer.begin();
-new Updates((news) => void viewer.renew(news));
+new Updates((news, isAnew) => void viewer.renew(news, isAnew));
 
 function makeGlobe(): Globe {
   try {

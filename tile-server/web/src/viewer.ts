@@ -21,6 +21,7 @@ import { drawCheck } from "./panels/check";
 import type { Controls } from "./panels/controls";
 import type { Panels } from "./panels/panels";
 import type { PlacePanel } from "./panels/place";
+import type { Catalogue } from "./state/catalogue";
 import type { Inventory } from "./state/inventory";
 import { INITIAL, type State, type Store } from "./state/store";
 import { clampToRange, isOutside, outsideText } from "./time/steps";
@@ -125,26 +126,32 @@ export class Viewer {
     await this.#loadAside();
   }
 
-  /** Shows what is new in the page that is open: what did not change stays as it is. */
-  async renew(all: News[]): Promise<void> {
+  /**
+   * Shows what is new in the page that is open: what did not change stays as it is. `isAnew`: news may have been missed, so
+   * that the server's list is held against the one that is here.
+   */
+  async renew(told: News[], isAnew: boolean): Promise<void> {
     const { store, inventory, notices, controls, sources, placePanel, budgetPanel, lookPanel, report } = this.#parts;
-    const before = inventory.product;
-    for (const news of all) {
-      // Told again of a version that is known: what lifts its particles is there now.
-      const { catalogue } = inventory;
-      if (catalogue.find(news.product)?.manifest === news.manifest) catalogue.revise(news.product);
-    }
-    const relief = store.state.look.relief;
-    const isReliefNew = before !== undefined && all.some((news) => news.product === relief);
-    if (isReliefNew) inventory.catalogue.revise(before.product);
+    let known: Catalogue;
     try {
-      await inventory.renew();
+      known = await inventory.renew();
     } catch (error) {
       report("products", error);
       return;
     }
-    sources.forget();
     const { catalogue } = inventory;
+    const missed = isAnew ? catalogue.newsSince(known) : [];
+    const all = [...told, ...missed.filter(({ product }) => told.every((news) => news.product !== product))];
+    if (all.length === 0) return;
+    const before = known.find(store.state.product);
+    for (const news of all) {
+      // Told again of a version that is known: what lifts its particles is there now.
+      if (known.find(news.product)?.manifest === news.manifest) catalogue.revise(news.product);
+    }
+    const relief = store.state.look.relief;
+    const isReliefNew = before !== undefined && all.some((news) => news.product === relief);
+    if (isReliefNew) catalogue.revise(before.product);
+    sources.forget();
     notices.tell("news", `New data: ${catalogue.titlesOf(all.map((news) => news.product)).join(", ")}`);
     controls.setProducts(catalogue.products);
     const now = inventory.product;

@@ -1,4 +1,4 @@
-//! What the catalogue says of products: titles of what is new, each once, legends of the versions that it has, and when values hold.
+//! What the catalogue says of products: titles of what is new, each once, legends of the versions that it has, when values hold, and what was missed.
 import { describe, expect, it } from "vitest";
 import type { Product } from "../src/api/types";
 import { Catalogue } from "../src/state/catalogue";
@@ -64,5 +64,34 @@ describe("the instant that a step's values are those of", () => {
     const at = (id: string) => catalogue.stepsOf(id).map((step) => new Date(step.atMs).toISOString());
     expect(at("flux")).toEqual(["2000-01-16T12:00:00.000Z"]);
     expect(at("flux-accumulated")).toEqual(["2000-02-01T00:00:00.000Z"]);
+  });
+});
+
+describe("what was missed", () => {
+  const period = { start: "2000-01-01T00:00:00Z", end: "2001-01-01T00:00:00Z" };
+  const flux = { ...product("flux", "CO2 flux"), ...period };
+  const sum: Product = {
+    ...product("flux-accumulated", "CO2 flux, accumulated", "flux@1-00000000"),
+    quantity: "accumulated_carbon",
+  };
+  const sst = product("sst", "Temperature");
+  const before = new Catalogue([flux, sum, sst]);
+  const told = (products: Product[]) => new Catalogue(products, before).newsSince(before);
+
+  it("is every version that is another one, at all of its times, and what is there for the first time", () => {
+    expect(told([flux, sum, sst])).toEqual([]);
+    expect(told([{ ...flux, manifest: "flux@2-00000000" }, sum, sst])).toEqual([
+      { product: "flux", manifest: "flux@2-00000000", touched: [period] },
+    ]);
+    expect(told([flux, sum, sst, product("wind", "Wind")]).map((news) => news.product)).toEqual(["wind"]);
+  });
+
+  it("is the same version again where others lift its particles now", () => {
+    const lifted = told([flux, { ...sum, manifest: "flux-accumulated@2-00000000" }, sst]);
+    expect(lifted.map((news) => news.manifest)).toEqual([flux.manifest, "flux-accumulated@2-00000000"]);
+  });
+
+  it("is nothing before there was a list", () => {
+    expect(before.newsSince(new Catalogue([]))).toEqual([]);
   });
 });

@@ -186,6 +186,32 @@ describe("news", () => {
     expect(told).toHaveLength(2);
   });
 
+  it("say of every stream that it is new, for what was told before it may be lost", () => {
+    vi.useFakeTimers();
+    Fake.all.length = 0;
+    const told: [count: number, isAnew: boolean][] = [];
+    new Updates(
+      (bundle, isAnew) => told.push([bundle.length, isAnew]),
+      (url) => new Fake(url),
+    );
+    Fake.all[0]?.say("open");
+    vi.advanceTimersByTime(1_000);
+    Fake.all[0]?.say("product", JSON.stringify(news));
+    vi.advanceTimersByTime(1_000);
+    // A refusal ends the stream; what the browser brings back by itself opens again, too.
+    Fake.all[0]?.close();
+    Fake.all[0]?.say("error");
+    vi.advanceTimersByTime(60_000);
+    expect(told).toEqual([
+      [0, true],
+      [1, false],
+    ]);
+    Fake.all[1]?.say("open");
+    Fake.all[1]?.say("product", JSON.stringify(news));
+    vi.advanceTimersByTime(1_000);
+    expect(told.slice(2)).toEqual([[1, true]]);
+  });
+
   it("make other addresses of tiles and keep what was learnt", () => {
     const address = (manifest: string, revision: number) =>
       tileTemplate("flux", "map", "2000-01-01T00:00:00Z", { manifest, revision });

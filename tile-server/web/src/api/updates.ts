@@ -1,4 +1,5 @@
-//! News of new data: the server's event stream in, what became new in small bundles out; it finds its own way back after a break.
+//! News of new data: the server's event stream in, what became new in small bundles out; it finds its own way back after a break,
+//! and says so, because what was told meanwhile may be lost.
 import { address } from "./client";
 import type { News } from "./types";
 
@@ -15,13 +16,17 @@ export interface Stream {
   close(): void;
 }
 
+/** `isAnew`: the stream has just been opened, and what was told before nobody may have heard. */
+type OnNews = (news: News[], isAnew: boolean) => void;
+
 export class Updates {
-  readonly #onNews: (news: News[]) => void;
+  readonly #onNews: OnNews;
   readonly #open: (url: string) => Stream;
   #gathered: News[] = [];
+  #isAnew = false;
   #timer: ReturnType<typeof setTimeout> | undefined;
 
-  constructor(onNews: (news: News[]) => void, open: (url: string) => Stream = (url) => new EventSource(url)) {
+  constructor(onNews: OnNews, open: (url: string) => Stream = (url) => new EventSource(url)) {
     this.#onNews = onNews;
     this.#open = open;
     this.#listen();
@@ -29,6 +34,10 @@ export class Updates {
 
   #listen(): void {
     const stream = this.#open(address("api/events"));
+    stream.addEventListener("open", () => {
+      this.#isAnew = true;
+      this.#gather();
+    });
     stream.addEventListener("product", (event) => {
       const news = parseNews(event.data);
       if (news) this.#gather(news);
@@ -40,11 +49,13 @@ export class Updates {
     });
   }
 
-  #gather(news: News): void {
-    this.#gathered.push(news);
+  #gather(...news: News[]): void {
+    this.#gathered.push(...news);
     this.#timer ??= setTimeout(() => {
       this.#timer = undefined;
-      this.#onNews(this.#gathered.splice(0));
+      const isAnew = this.#isAnew;
+      this.#isAnew = false;
+      this.#onNews(this.#gathered.splice(0), isAnew);
     }, GATHER_MS);
   }
 }

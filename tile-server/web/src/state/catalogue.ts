@@ -1,5 +1,5 @@
 //! The products as the page uses them: steps parsed, and the layer that a state describes.
-import type { Legend, Mode, Product, Quantity } from "../api/types";
+import type { Legend, Mode, News, Product, Quantity } from "../api/types";
 import type { LayerSpec } from "../globe/layer";
 import { effective, type Look } from "../look/look";
 import { titleText } from "../page/format";
@@ -61,7 +61,26 @@ export class Catalogue {
 
   /** Carbon that accumulated lifts the product's particles. */
   isLifted(id: string): boolean {
-    return this.products.some(
+    return this.#liftersOf(id).length > 0;
+  }
+
+  /**
+   * What became new since an older list, told as the server tells it: versions, and those whose particles others lift now.
+   * Which times they touch nobody knows, so it is all. Nothing where there was no list.
+   */
+  newsSince(before: Catalogue): News[] {
+    if (before.products.length === 0) return [];
+    const isNew = ({ product, manifest }: Product) => before.find(product)?.manifest !== manifest;
+    const all = this.products.filter((product) => isNew(product) || this.#liftersOf(product.product).some(isNew));
+    return all.map(({ product, manifest, start, end }) => ({
+      product,
+      manifest,
+      touched: typeof start === "string" && typeof end === "string" ? [{ start, end }] : [],
+    }));
+  }
+
+  #liftersOf(id: string): Product[] {
+    return this.products.filter(
       (product) => product.quantity === ACCUMULATED && product.derived_from?.startsWith(`${id}@`),
     );
   }

@@ -12,6 +12,9 @@ export class Inventory {
   catalogue = new Catalogue([]);
   palettes: readonly Palette[] = [];
   readonly #store: Store;
+  /** Lists that were asked for, and the one of them that is here. */
+  #asked = 0;
+  #taken = 0;
 
   constructor(store: Store) {
     this.#store = store;
@@ -19,14 +22,31 @@ export class Inventory {
 
   /** Products and palettes; nothing changes where one of them does not come. */
   async load(): Promise<void> {
+    const turn = this.#turn();
     const [products, palettes] = await Promise.all([api.products(), api.palettes()]);
-    this.catalogue = new Catalogue(products, this.catalogue);
+    this.#take(turn, products);
     this.palettes = palettes;
   }
 
-  /** Products alone. */
-  async renew(): Promise<void> {
-    this.catalogue = new Catalogue(await api.products(), this.catalogue);
+  /** Products alone; the answer is what was known of them before. */
+  async renew(): Promise<Catalogue> {
+    const turn = this.#turn();
+    const products = await api.products();
+    const before = this.catalogue;
+    this.#take(turn, products);
+    return before;
+  }
+
+  #turn(): number {
+    this.#asked += 1;
+    return this.#asked;
+  }
+
+  /** A list that was asked for before the one that is here is older, however late it comes. */
+  #take(turn: number, products: Product[]): void {
+    if (turn < this.#taken) return;
+    this.#taken = turn;
+    this.catalogue = new Catalogue(products, this.catalogue);
   }
 
   /** The chosen product. */
