@@ -66,7 +66,7 @@ const connection = new Connection(
 const report = (key: string, error: unknown) => connection.report(key, error);
 const sources = new TileSources();
 const stage = new LayerStage(globe.scene, sources, counts, store.state.opacity, {
-  onRefused: (error) => report("layer", error),
+  onRefused: (error) => connection.layerRefused(error),
   onFailed: (failure) => void connection.tileFailed(failure),
 });
 const presenter = new Presenter(stage);

@@ -1,4 +1,4 @@
-//! What the page says of tiles that did not come, and whether the server is asked why.
+//! What the page says of tiles and layers that did not come, what ends with them, and whether the server is asked why.
 import { afterEach, beforeEach, expect, it, vi } from "vitest";
 import { Connection } from "../src/page/connection";
 import type { Notices } from "../src/page/notices";
@@ -17,11 +17,11 @@ beforeEach(() => {
 });
 afterEach(() => void vi.unstubAllGlobals());
 
-function connection(): Connection {
+function connection(onTrouble: () => void = () => undefined): Connection {
   const notices = { show: (_key: string, text: string) => shown.push(text), clear: () => undefined };
   return new Connection(
     notices as unknown as Notices,
-    () => undefined,
+    onTrouble,
     () => undefined,
   );
 }
@@ -36,4 +36,13 @@ it("any other is asked, for a picture's failure carries no reason", async () => 
   await connection().tileFailed({ status: 500, url, reason: undefined });
   expect(shown).toEqual(["Pictures are missing: planted: broken"]);
   expect(asked).toEqual([url]);
+});
+
+it("a layer that is refused ends playing, as failing tiles do", async () => {
+  const trouble = vi.fn();
+  connection(trouble).layerRefused(new Error("planted: no such look"));
+  expect(trouble).toHaveBeenCalledOnce();
+  expect(shown).toEqual(["planted: no such look"]);
+  await connection(trouble).tileFailed({ status: 500, url, reason: undefined });
+  expect(trouble).toHaveBeenCalledTimes(2);
 });

@@ -27,6 +27,12 @@ export class Connection {
     else this.#notices.show(key, error instanceof Error ? error.message : String(error));
   }
 
+  /** The server does not say where a layer's pictures are. */
+  layerRefused(error: unknown): void {
+    this.#onTrouble();
+    this.report("layer", error);
+  }
+
   /** A tile failed: ask its address once more as JSON, unless that was said already or it is not time to ask. */
   async tileFailed({ status, url, reason }: TileFailure): Promise<void> {
     if (this.#isLost) return;

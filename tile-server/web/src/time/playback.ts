@@ -11,6 +11,9 @@ const MOST_FRAME_MS = 250;
 /** Time does not run further ahead of the picture than this: where pictures come slowly so does time. */
 const MOST_LAG_MS = 700;
 
+/** What did not come is not asked for again at once: it would be asked for with every frame of the screen. */
+const AGAIN_MS = 250;
+
 /** What shows the picture of the state by itself. */
 export interface Follower {
   readonly isFollowing: boolean;
@@ -76,7 +79,7 @@ export class Playback {
       const startedMs = performance.now();
       const prepared = await this.#presenter.preload(spec);
       loadMs = performance.now() - startedMs;
-      await until(shownAtMs + stride * frameMs);
+      await until(Math.max(shownAtMs + stride * frameMs, prepared ? 0 : performance.now() + AGAIN_MS));
       if (!prepared) continue;
       // A hand on the slider, a new product or a new look made this picture obsolete while it loaded.
       const now = this.#specAt(timeMs);
