@@ -230,7 +230,7 @@ export class Viewer {
     document.title = `${titleText(chosen)} – Fluxglobe`;
     const known = inventory.steps;
     timeline.setSteps(known);
-    budgetPanel.setSteps(known);
+    budgetPanel.setSteps(chosen.product, known);
     lookPanel.draw();
     if (known.length === 0) notices.show("steps", `“${chosen.title}” has no periods yet.`);
     else notices.clear("steps");

@@ -53,6 +53,7 @@ export class BudgetForm {
   ]);
   #regions: readonly Region[] = [];
   #steps: readonly Step[] = [];
+  #product = "";
 
   constructor(context: BudgetFormContext) {
     this.#context = context;
@@ -94,11 +95,25 @@ export class BudgetForm {
     this.show(chosen);
   }
 
-  setSteps(steps: readonly Step[]): void {
+  /** Of the same product the chosen period stays, unless it went up to the newest step: then it still does. */
+  setSteps(product: string, steps: readonly Step[]): void {
+    const isSame = product === this.#product;
+    const [from, to] = isSame ? [this.#chosen(this.#from), this.#chosen(this.#to)] : [];
+    const isUpToNewest = to === this.#steps.at(-1);
+    this.#product = product;
     this.#steps = steps;
     for (const select of [this.#from, this.#to])
       select.replaceChildren(...steps.map((step, index) => el("option", { value: String(index) }, stepLabel(step))));
-    this.#to.value = String(steps.length - 1);
+    const last = steps.length - 1;
+    // Where a step is gone, the next one within the period.
+    const first = from ? steps.findIndex(({ startMs }) => startMs >= from.startMs) : 0;
+    const end = to && !isUpToNewest ? steps.filter(({ endMs }) => endMs <= to.endMs).length - 1 : last;
+    this.#from.value = String(first < 0 ? last : first);
+    this.#to.value = String(Math.max(end, 0));
+  }
+
+  #chosen(select: HTMLSelectElement): Step | undefined {
+    return this.#steps[Number(select.value)];
   }
 
   /** Sets the fields to a region without asking anything. */
@@ -120,8 +135,7 @@ export class BudgetForm {
 
   /** Undefined while the period is empty or there are no steps. */
   query(region: string): BudgetQuery | undefined {
-    const from = this.#steps[Number(this.#from.value)];
-    const to = this.#steps[Number(this.#to.value)];
+    const [from, to] = [this.#chosen(this.#from), this.#chosen(this.#to)];
     if (!from || !to) return undefined;
     if (to.endMs <= from.startMs) {
       this.#say("The last period lies before the first.");

@@ -50,8 +50,8 @@ export class BudgetPanel {
     this.#form.setRegions(regions, this.#context.store.state.region);
   }
 
-  setSteps(steps: readonly Step[]): void {
-    this.#form.setSteps(steps);
+  setSteps(product: string, steps: readonly Step[]): void {
+    this.#form.setSteps(product, steps);
     this.#answered = "";
     void this.refresh();
   }
