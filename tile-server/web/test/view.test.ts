@@ -1,5 +1,5 @@
 //! The shareable address, series values, cross-fades, ticks and files: pure parts of what the page shows.
-import { describe, expect, it } from "vitest";
+import { afterEach, describe, expect, it } from "vitest";
 import { MODES } from "../src/api/words";
 import { underOpacity } from "../src/globe/fade";
 import { tickTexts, ticksOf } from "../src/look/legend";
@@ -44,6 +44,35 @@ describe("the address", () => {
 
   it("takes nothing from nonsense", () => {
     expect(decodeHash("#mode=fog&time=soon&camera=1,2&opacity=7&place=0,95&tab=x&product=%E0%A4%A&=&&")).toEqual({});
+  });
+});
+
+describe("an instant in the address", () => {
+  const read = (text: string): string | undefined => {
+    const { timeMs } = decodeHash(`#time=${text}`);
+    return timeMs === undefined ? undefined : new Date(timeMs).toISOString();
+  };
+  const home = process.env["TZ"];
+  afterEach(() => {
+    if (home === undefined) delete process.env["TZ"];
+    else process.env["TZ"] = home;
+  });
+
+  it("is the same wherever its reader sits", () => {
+    process.env["TZ"] = "Asia/Tokyo";
+    expect(new Date(2000, 0, 1).getTimezoneOffset(), "the clock is that of Tokyo").toBe(-540);
+    expect(read("2000-07-04T05:06")).toBe("2000-07-04T05:06:00.000Z");
+    expect(read("2000-07-04T05:06:07.5")).toBe("2000-07-04T05:06:07.500Z");
+    expect(read("2000-07-04T05:06:07Z")).toBe("2000-07-04T05:06:07.000Z");
+    expect(read("2000-07-04T05:06:07+09:00")).toBe("2000-07-03T20:06:07.000Z");
+    expect(read("2000-07-04")).toBe("2000-07-04T00:00:00.000Z");
+    expect(read("2000-07")).toBe("2000-07-01T00:00:00.000Z");
+    expect(read("2000")).toBe("2000-01-01T00:00:00.000Z");
+  });
+
+  it("is none where it is not written as one", () => {
+    for (const text of ["5", "20000", "4 Jul 2000", "7/4/2000", "2000-13-01", "2000-07-04T25:00", "2000-07-04T05", ""])
+      expect(read(text), text).toBeUndefined();
   });
 });
 

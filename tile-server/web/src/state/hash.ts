@@ -41,7 +41,7 @@ export function decodeHash(hash: string): Partial<State> {
 function read(key: string, value: string, found: Partial<State>): void {
   if (key === "product" && value !== "") found.product = value;
   else if (key === "mode" && MODES.includes(value as Mode)) found.mode = value as Mode;
-  else if (key === "time" && Number.isFinite(Date.parse(value))) found.timeMs = Date.parse(value);
+  else if (key === "time") assign(found, "timeMs", instantOf(value));
   else if (key === "camera") assign(found, "camera", cameraOf(value));
   else if (key === "opacity" && value !== "" && Number(value) >= 0 && Number(value) <= 1) found.opacity = Number(value);
   else if (key === "place") assign(found, "place", placeOf(value));
@@ -74,6 +74,15 @@ function cameraOf(text: string): CameraView | undefined {
   if (lon === undefined || lat === undefined || heightKm === undefined) return undefined;
   if (Math.abs(lat) > 90 || heightKm <= 0 || heightKm > 200_000) return undefined;
   return { lon: wrapLon(lon), lat, heightKm, headingDeg, pitchDeg, rollDeg };
+}
+
+/** A year, month, day or instant of ISO 8601: browsers take much else for a date, and what has no offset for one of the reader's own clock. */
+function instantOf(text: string): number | undefined {
+  const found = /^\d{4}(?:-\d{2}(?:-\d{2}(T\d{2}:\d{2}(?::\d{2}(?:\.\d+)?)?(Z|[+-]\d{2}:\d{2})?)?)?)?$/.exec(text);
+  if (!found) return undefined;
+  const [, time, offset] = found;
+  const timeMs = Date.parse(time !== undefined && offset === undefined ? `${text}Z` : text);
+  return Number.isFinite(timeMs) ? timeMs : undefined;
 }
 
 function placeOf(text: string): Place | undefined {
