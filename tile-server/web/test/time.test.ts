@@ -173,6 +173,20 @@ describe("texts", () => {
     expect(stepLabel(step("2000-01-01T00:00:00Z", "2001-01-01T00:00:00Z"))).toBe("2000");
     expect(stepLabel(step("2002-01-05T00:00:00Z", "2002-01-06T00:00:00Z"))).toBe("5 Jan 2002");
     expect(stepLabel(step("2002-01-05T06:00:00Z", "2002-01-05T12:00:00Z"))).toBe("5 Jan 2002 06:00");
+    expect(stepLabel(step("2000-01-16T00:00:00Z", "2000-02-16T00:00:00Z"))).toBe("Jan 2000");
+  });
+
+  it("label a step of more than a day, month or year by its first and last", () => {
+    const label = (start: string, end: string) => stepLabel(parseSteps([month(`${start}T00:00:00Z`, `${end}T00:00:00Z`)])[0] as Step);
+    expect(label("2000-09-01", "2000-12-01")).toBe("Sep–Nov 2000");
+    expect(label("2000-12-01", "2001-03-01")).toBe("Dec 2000–Feb 2001");
+    expect(label("2000-01-01", "2010-01-01")).toBe("2000–2009");
+    expect(label("2002-01-05", "2002-01-13")).toBe("5–12 Jan 2002");
+    expect(label("2002-01-29", "2002-02-06")).toBe("29 Jan–5 Feb 2002");
+    expect(label("2001-12-27", "2002-01-04")).toBe("27 Dec 2001–3 Jan 2002");
+    expect(label("1999-03-15", "2000-06-01")).toBe("15 Mar 1999–31 May 2000");
+    expect(label("2000-01-01", "2001-03-01")).toBe("Jan 2000–Feb 2001");
+    expect(label("2001-01-05", "2002-01-05")).toBe("2001");
   });
 });
 

@@ -146,15 +146,35 @@ export function formatInstant(timeMs: number): string {
   return `${date.getUTCDate()} ${MONTHS[date.getUTCMonth()]} ${date.getUTCFullYear()}, ${time} UTC`;
 }
 
-/** Shortest label that tells one step of the product from the next: month, day, or day and hour. */
-export function stepLabel(step: Step): string {
-  const start = new Date(step.startMs);
-  const days = (step.endMs - step.startMs) / DAY_MS;
-  const month = MONTHS[start.getUTCMonth()];
-  if (days > 300) return `${start.getUTCFullYear()}`;
-  if (days >= 27) return `${month} ${start.getUTCFullYear()}`;
-  const day = `${start.getUTCDate()} ${month} ${start.getUTCFullYear()}`;
-  return days >= 1 ? day : `${day} ${start.toISOString().slice(11, 16)}`;
+/** Shortest label that tells all of a step: its year, month or day where it is no more than one, day and hour, or from which to which. */
+export function stepLabel({ startMs, endMs }: Step): string {
+  const [start, end, last] = [new Date(startMs), new Date(endMs), new Date(endMs - 1)];
+  const days = (endMs - startMs) / DAY_MS;
+  const year = (date: Date) => [String(date.getUTCFullYear())];
+  const month = (date: Date) => [MONTHS[date.getUTCMonth()] ?? "", ...year(date)];
+  const day = (date: Date) => [String(date.getUTCDate()), ...month(date)];
+  if (days < 1) return `${day(start).join(" ")} ${start.toISOString().slice(11, 16)}`;
+  if (days === 1) return day(start).join(" ");
+  if (days > 300 && days <= 366) return year(start).join(" ");
+  if (days >= 27 && days <= 31) return month(start).join(" ");
+  if ([start, end].every(isNewYear)) return fromTo(year(start), year(last));
+  if ([start, end].every(isNewMonth)) return fromTo(month(start), month(last));
+  return fromTo(day(start), day(last));
+}
+
+/** `5–12 Jan 2002`: what both have at their ends is said once. */
+function fromTo(from: readonly string[], to: readonly string[]): string {
+  let own = from.length;
+  while (own > 0 && from[own - 1] === to[own - 1]) own -= 1;
+  return own === 0 ? to.join(" ") : `${from.slice(0, own).join(" ")}–${to.join(" ")}`;
+}
+
+function isNewMonth(date: Date): boolean {
+  return date.getUTCDate() === 1 && date.getTime() % DAY_MS === 0;
+}
+
+function isNewYear(date: Date): boolean {
+  return date.getUTCMonth() === 0 && isNewMonth(date);
 }
 
 /** Months by name and, where a year begins or at the first label, the year below; within days hours with the day below. */

@@ -15,8 +15,9 @@ import {
 } from "./steps";
 
 const SPEEDS = [0.25, 0.5, 1, 2, 4];
-/** Labels under the slider stay apart by at least this. */
+/** Labels under the slider stay apart by at least this, and by so much a letter. */
 const LABEL_WIDTH_PX = 64;
+const LETTER_WIDTH_PX = 6.4;
 
 export class Timeline {
   readonly #store: Store;
@@ -167,12 +168,15 @@ export class Timeline {
     const count = this.#steps.length;
     const width = this.#ticks.clientWidth;
     if (count === 0 || width === 0) return;
-    const every = Math.max(1, Math.ceil(count / Math.max(1, Math.floor(width / LABEL_WIDTH_PX))));
+    const labels = this.#steps.map(stepLabel);
+    const longest = labels.reduce((most, { length }) => Math.max(most, length), 0);
+    const labelWidth = Math.max(LABEL_WIDTH_PX, longest * LETTER_WIDTH_PX);
+    const every = Math.max(1, Math.ceil(count / Math.max(1, Math.floor(width / labelWidth))));
     this.#ticks.replaceChildren();
-    this.#steps.forEach((step, index) => {
+    labels.forEach((label, index) => {
       const isLabelled = index % every === 0;
       if (!isLabelled && count > 60) return;
-      const tick = el("span", { class: isLabelled ? "tick labelled" : "tick" }, isLabelled ? stepLabel(step) : null);
+      const tick = el("span", { class: isLabelled ? "tick labelled" : "tick" }, isLabelled ? label : null);
       tick.style.left = `${((index + 0.5) / count) * 100}%`;
       this.#ticks.append(tick);
     });
