@@ -41,6 +41,7 @@ class PaperSocket implements Socket {
 class Desk {
   readonly sockets: PaperSocket[] = [];
   readonly shots: Shot<string, string>[] = [];
+  readonly dropped: string[] = [];
   readonly refused: number[] = [];
   readonly turns: boolean[] = [];
   frames: (() => void)[] = [];
@@ -60,6 +61,7 @@ class Desk {
         if (!this.isSlow) return Promise.resolve(image);
         return new Promise((resolve) => this.decoding.push(() => resolve(image)));
       },
+      drop: (image) => this.dropped.push(image),
       frame: (call) => this.frames.push(call),
       nowMs: () => this.nowMs,
     },
@@ -201,6 +203,17 @@ describe("pictures", () => {
     await settled();
     expect(desk.images).toEqual(["moving 2"]);
     expect(desk.client.isAnswered).toBe(false);
+    expect(desk.dropped, "what is let go takes no memory").toEqual(["moving 1"]);
+  });
+
+  it("that are decoded after the stream ended are let go", async () => {
+    const desk = asked(1);
+    desk.isSlow = true;
+    desk.socket.hear(message(header(1)));
+    desk.client.stop();
+    desk.decoding[0]?.();
+    await settled();
+    expect([desk.images, desk.dropped]).toEqual([[], ["moving 1"]]);
   });
 
   it("that the server refuses are told of, unless something else is asked for by now", () => {

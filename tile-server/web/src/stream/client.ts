@@ -30,6 +30,8 @@ export interface Hearer<Scene, Image> {
 export interface Means<Image> {
   open: () => Socket;
   decode: (picture: Picture) => Promise<Image>;
+  /** Nobody will see an image. */
+  drop: (image: Image) => void;
   /** Calls once before the screen is drawn next. */
   frame: (call: () => void) => void;
   nowMs: () => number;
@@ -183,7 +185,10 @@ export class StreamClient<Scene, Image> {
     this.#means.decode(picture).then(
       (image) => {
         // Small pictures are decoded sooner than large ones that came before.
-        if (!this.#isNewer(picture, this.#given) || !this.#isOpen) return;
+        if (!this.#isNewer(picture, this.#given) || !this.#isOpen) {
+          this.#means.drop(image);
+          return;
+        }
         this.#given = { id: picture.id, isFull: picture.kind === "full" };
         this.#hearer.onShot({ picture, image, ...asked });
       },

@@ -72,6 +72,7 @@ export class Live {
       {
         open: () => new WebSocket(address("stream").replace(/^http/, "ws")),
         decode,
+        drop: (image) => image.close(),
         frame: (call) => requestAnimationFrame(call),
         nowMs: () => performance.now(),
       },
