@@ -32,17 +32,17 @@ pub(super) fn drawn(legend: &Legend) -> String {
 
 fn write(legend: &Legend, to: &mut String) -> std::fmt::Result {
     let [width, height] = legend.size_px();
+    // Files state them in any letters.
+    let title = escaped(&legend.title());
+    let [label, unit] = [legend.label, legend.unit].map(escaped);
     write!(
         to,
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\" \
          font-family=\"sans-serif\" font-size=\"14\" fill=\"#222\">\
-         <title>{}</title>\
+         <title>{title}</title>\
          <rect width=\"{width}\" height=\"{height}\" fill=\"#fff\"/>\
-         <text x=\"{MARGIN_PX}\" y=\"21\">{}</text><text x=\"{}\" y=\"21\" text-anchor=\"end\">{}</text>",
-        legend.title(),
-        legend.label,
+         <text x=\"{MARGIN_PX}\" y=\"21\">{label}</text><text x=\"{}\" y=\"21\" text-anchor=\"end\">{unit}</text>",
         width - MARGIN_PX,
-        legend.unit
     )?;
     let bar = Bar {
         x: f64::from(MARGIN_PX),
@@ -73,6 +73,24 @@ fn write(legend: &Legend, to: &mut String) -> std::fmt::Result {
     }
     to.push_str("</svg>\n");
     Ok(())
+}
+
+/// Text as XML has it; anything else in it is no markup.
+pub fn escaped(text: &str) -> String {
+    let mut to = String::with_capacity(text.len());
+    for sign in text.chars() {
+        match sign {
+            '&' => to.push_str("&amp;"),
+            '<' => to.push_str("&lt;"),
+            '>' => to.push_str("&gt;"),
+            '"' => to.push_str("&quot;"),
+            '\'' => to.push_str("&apos;"),
+            // XML has no place for these, escaped or not.
+            sign if sign.is_control() || matches!(sign, '\u{fffe}' | '\u{ffff}') => to.push(' '),
+            sign => to.push(sign),
+        }
+    }
+    to
 }
 
 /// The colours of a legend from its low to its high end. A drawing has one such bar: it defines what it refers to.
@@ -124,6 +142,7 @@ pub fn write_bar(legend: &Legend, bar: Bar, to: &mut String) -> std::fmt::Result
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Form;
     use contract::colour::TransferOptions;
     use contract::quantity::Quantity;
 
@@ -144,6 +163,24 @@ mod tests {
             assert!(!svg.contains("mask") && !svg.contains("circle"));
             assert!(!svg.contains('&'), "nothing needs escaping: {svg}");
         }
+    }
+
+    #[test]
+    fn words_of_files_are_text_and_no_markup() {
+        let named = Quantity::open(
+            "chlorophyll_and_phaeopigments",
+            "mg m-3 <dry>",
+            "Chlorophyll & \"phaeopigments\"",
+        );
+        let quantity = named.unwrap().over([0.0, 5.0]).unwrap();
+        let transfer = TransferOptions::default().over(quantity).unwrap();
+        let legend = Legend::of(quantity, &transfer);
+        let svg = drawn(&legend);
+        let title = "Chlorophyll &amp; &quot;phaeopigments&quot;";
+        assert!(svg.contains(&format!("<title>{title}, mg ")), "{svg}");
+        assert!(svg.contains(&format!(">{title}</text>")), "{svg}");
+        assert!(svg.contains("&lt;dry&gt;</text>"), "{svg}");
+        legend.encoded(Form::Png).unwrap();
     }
 
     #[test]

@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use legend::LegendError;
 use legend::raster::{self, SANS, SERIF};
+use legend::svg::escaped;
 
 /// What most text is written in over panels.
 const LIGHT: &str = "#f4f7fb";
@@ -61,7 +62,7 @@ impl Text<'_> {
             self.size,
             self.ink.attributes(self.size)
         );
-        escape(self.words, &mut svg);
+        svg.push_str(&escaped(self.words));
         svg.push_str("</text>");
         svg
     }
@@ -120,22 +121,6 @@ pub(super) fn opening([width, height]: [f64; 2]) -> String {
     format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\" font-family=\"{SANS}\">"
     )
-}
-
-/// Text as XML has it; anything else in it is no markup.
-fn escape(text: &str, to: &mut String) {
-    for sign in text.chars() {
-        match sign {
-            '&' => to.push_str("&amp;"),
-            '<' => to.push_str("&lt;"),
-            '>' => to.push_str("&gt;"),
-            '"' => to.push_str("&quot;"),
-            '\'' => to.push_str("&apos;"),
-            // XML has no place for these, escaped or not.
-            sign if sign.is_control() || matches!(sign, '\u{fffe}' | '\u{ffff}') => to.push(' '),
-            sign => to.push(sign),
-        }
-    }
 }
 
 /// As much of a text as fits into a length, with an ellipsis where something is missing; none where nothing fits.

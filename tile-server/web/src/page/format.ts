@@ -52,7 +52,7 @@ export function numberText(value: number | null | undefined, digits: number): st
 
 /** Numbers below this are written with an exponent: so many decimals nobody counts. */
 const LEAST_WRITTEN = 1e-5;
-/** Figures of the least number that is written without one. */
+/** Decimals of four figures of the least number that is written without an exponent. */
 const MOST_DECIMALS = 8;
 
 /** Decimals that show about `significant` figures of numbers as large as `magnitude`, 0 to 8. */
