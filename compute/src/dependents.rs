@@ -19,7 +19,7 @@ use crate::computed::{Request, compute_if};
 use crate::derive::{
     Progress, StatisticRequest, chosen_start, derive_accumulated_if, derive_statistics_if,
 };
-use crate::publish::{IsStillAsked, MADE_AGAIN, first_instant};
+use crate::publish::{IsStillAsked, MADE_AGAIN};
 use crate::summed::has_budget;
 use crate::{ComputeError, Engine, catalogue};
 pub use behind::behind;
@@ -186,9 +186,9 @@ async fn make(
             Recipe::Accumulated(source) => {
                 let target = source.accumulated()?;
                 let before = manifests::latest(engine.store(), &target).await?;
-                let before = before.as_ref().map(first_instant);
+                let before = before.as_ref().map(Manifest::accumulated_since);
                 let is_still_asked =
-                    |latest: Option<&Manifest>| latest.map(first_instant) == before;
+                    |latest: Option<&Manifest>| latest.map(Manifest::accumulated_since) == before;
                 let is_still_asked = Some(&is_still_asked as &IsStillAsked<'_>);
                 // A start that somebody chose stays as long as the product does.
                 let start = chosen_start(engine.store(), source).await?;

@@ -93,16 +93,17 @@ pub(crate) fn derive_accumulated_if<'a>(
         let target = product.accumulated()?;
         let latest = manifests::latest(engine.store(), &target).await?;
         check_asked((&target, latest.as_ref()), is_still_asked)?;
+        let asked = Asked::of(start, &steps);
         if let Some(latest) = latest
             .as_ref()
-            .filter(|latest| is_up_to_date(latest, &source, &steps))
+            .filter(|latest| is_up_to_date(latest, &source, asked))
         {
             progress(of_all(steps.len(), &steps));
             // Whoever published it may have been killed before the cube followed.
             cube::keep_up(engine.store(), latest).await;
             return Ok(latest.clone());
         }
-        let of = (&source, &steps[..]);
+        let of = (&source, asked);
         derive(engine, of, latest.as_ref(), is_still_asked, progress).await
     })
 }
@@ -124,20 +125,43 @@ pub fn derive_anew<'a>(
             latest.steps.retain(|step| step.period.end <= from);
             latest
         });
-        let of = (&source, &steps[..]);
+        let of = (&source, Asked::of(start, &steps));
         derive(engine, of, trusted.as_ref(), None, progress).await
     })
 }
 
+/// What is accumulated.
+#[derive(Clone, Copy)]
+struct Asked<'a> {
+    steps: &'a [SourceStep<'a>],
+    /// Where it is to begin, if that lies before the first step, in a gap or before all that landed.
+    since: Option<TimeMs>,
+}
+
+impl<'a> Asked<'a> {
+    fn of(start: Option<TimeMs>, steps: &'a [SourceStep<'a>]) -> Self {
+        let first = steps.first().map(|step| step.period.start);
+        Self {
+            steps,
+            since: start.filter(|start| first.is_some_and(|first| *start < first)),
+        }
+    }
+}
+
 async fn derive(
     engine: &Engine,
-    (source, steps): (&Manifest, &[SourceStep<'_>]),
+    (source, asked): (&Manifest, Asked<'_>),
     prior: Option<&Manifest>,
     is_still_asked: Option<&IsStillAsked<'_>>,
     progress: &Progress<'_>,
 ) -> Result<Manifest, ComputeError> {
     let workshop = Workshop::of(engine.store());
-    let derived = accumulated((engine, workshop), source, steps, prior, progress).await?;
+    let of = (engine, workshop);
+    let mut derived = accumulated(of, source, asked.steps, prior, progress).await?;
+    let first = derived.steps.first_mut();
+    if let Some(contributed) = first.and_then(|step| step.contributed.as_mut()) {
+        contributed.since = asked.since;
+    }
     publish_if(engine, derived, None, is_still_asked).await
 }
 
@@ -170,7 +194,7 @@ async fn flux(store: &Store, product: &ProductId) -> Result<Manifest, ComputeErr
 
 /// The start that somebody chose for a product's accumulated carbon; none if it begins with its source, or is not there.
 ///
-/// A chosen start is one that is not where the source began when it was derived from it.
+/// A chosen start is one that is not where the source began when it was derived from it. One that lay in a gap stays what it was.
 pub fn chosen_start<'a>(
     store: &'a Store,
     product: &'a ProductId,
@@ -182,6 +206,9 @@ pub fn chosen_start<'a>(
         let (Some(first), Some(source)) = (latest.steps.first(), &latest.derived_from) else {
             return Ok(None);
         };
+        if let Some(since) = first.contributed.as_ref().and_then(|it| it.since) {
+            return Ok(Some(since));
+        }
         let source = match manifests::load(store, source).await {
             Ok(source) => source,
             // That version is gone: nobody can tell any more.
@@ -217,11 +244,13 @@ pub fn derived(manifest: &Manifest) -> Option<Body> {
     })
 }
 
-/// Is the newest version derived from this very version of the source, from the same steps?
-fn is_up_to_date(latest: &Manifest, source: &Manifest, steps: &[SourceStep<'_>]) -> bool {
+/// Is the newest version derived from this very version of the source, from the same steps and the same start?
+fn is_up_to_date(latest: &Manifest, source: &Manifest, asked: Asked<'_>) -> bool {
     let made_of = latest.steps.iter().map(|step| step.raw_sha256);
+    let first = asked.steps.first().map(|step| step.period.start);
     latest.derived_from.as_ref() == Some(&source.id())
-        && made_of.eq(steps.iter().map(|step| step.made_of))
+        && made_of.eq(asked.steps.iter().map(|step| step.made_of))
+        && latest.accumulated_since() == asked.since.or(first)
 }
 
 fn of_all(done_steps: usize, steps: &[SourceStep<'_>]) -> DeriveProgress {

@@ -5,7 +5,6 @@ use std::sync::Arc;
 use contract::computed::{Computed, ComputedInput};
 use contract::manifest::Manifest;
 use contract::product::ProductId;
-use contract::time::TimeMs;
 use cube::AtHand;
 use storage::{StorageError, manifests};
 
@@ -99,7 +98,7 @@ fn is_same(latest: &Manifest, made: &Manifest) -> bool {
 fn is_asked_alike(one: &Manifest, other: &Manifest) -> bool {
     match (&one.computed, &other.computed) {
         // Carbon is accumulated from a start on.
-        (None, None) => first_instant(one) == first_instant(other),
+        (None, None) => one.accumulated_since() == other.accumulated_since(),
         (Some(own), Some(others)) => {
             let inputs = |of: &Computed| {
                 let named = |it: &ComputedInput| {
@@ -120,9 +119,4 @@ fn is_asked_alike(one: &Manifest, other: &Manifest) -> bool {
 /// What is computed step by step is asked for with a title and a quantity, which statistics have of their sources.
 fn is_same_thing(one: &Manifest, other: &Manifest) -> bool {
     one.title == other.title && one.quantity.is_same_kind(other.quantity)
-}
-
-/// When the first step of a version begins.
-pub(crate) fn first_instant(manifest: &Manifest) -> Option<TimeMs> {
-    manifest.steps.first().map(|step| step.period.start)
 }

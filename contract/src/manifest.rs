@@ -99,6 +99,9 @@ pub struct Contributed {
     pub counts: ObjectKey,
     /// Cells that had data in all of the accumulated time: a sum over one month of twelve is not a complete one.
     pub complete_cells: u64,
+    /// Of the first step alone: where accumulation was asked to begin, if the source had no step there; it does once that has landed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub since: Option<TimeMs>,
 }
 
 /// A run of consecutive steps, stored time-major.
@@ -123,6 +126,13 @@ impl Manifest {
             .filter(|step| step.masked.is_none())
             .count();
         (counted.sum(), uncounted)
+    }
+
+    /// Where accumulated carbon was asked to begin: before its first step where the source had none there.
+    pub fn accumulated_since(&self) -> Option<TimeMs> {
+        let first = self.steps.first()?;
+        let since = first.contributed.as_ref().and_then(|it| it.since);
+        Some(since.unwrap_or(first.period.start))
     }
 
     /// The name that answers cite.

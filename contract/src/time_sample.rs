@@ -240,6 +240,7 @@ mod tests {
             step.contributed = Some(Contributed {
                 counts: counts(content),
                 complete_cells,
+                since: None,
             });
         }
         let with_counts = |time: &str| {

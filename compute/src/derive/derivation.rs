@@ -168,6 +168,7 @@ impl<'a> Derivation<'a> {
             let contributed = Contributed {
                 counts,
                 complete_cells,
+                since: None,
             };
             self.done.push(stored(step, field, Some(contributed)));
             progress(of_all(self.done.len(), self.steps));

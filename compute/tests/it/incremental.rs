@@ -2,6 +2,7 @@
 
 use std::sync::Mutex;
 
+use compute::dependents::follow;
 use compute::derive::{DeriveProgress, chosen_start, derive_anew};
 use compute::{Engine, derive_accumulated};
 use contract::grid::Grid;
@@ -215,4 +216,35 @@ async fn a_start_is_chosen_if_the_source_did_not_begin_there() {
         .parse()
         .unwrap();
     assert!(store.exists(&key).await.unwrap());
+}
+
+/// Months land in any order: what is there when somebody chooses is not what he chose.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_start_that_was_chosen_in_a_gap_stays_when_the_gap_is_filled() {
+    let year = wavy_year(&FIVE_DEGREES);
+    let start = year[6].0.start;
+    let id = product("wavy");
+    // In a gap, and before all that has landed.
+    for early in [5, 0] {
+        let (_folder, store) = folder_store();
+        let engine = Engine::local(store.clone());
+        put(&store, &[&year[..early], &year[8..]].concat()).await;
+        let chosen = || derive_accumulated(&engine, &id, Some(start), &|_progress| ());
+        let first = chosen().await.unwrap();
+        assert_eq!(first.steps.len(), 4);
+        assert_eq!(first.accumulated_since(), Some(start));
+        assert_eq!(chosen().await.unwrap(), first);
+        assert_eq!(chosen_start(&store, &id).await.unwrap(), Some(start));
+        put(&store, &year).await;
+        let followed = follow(&engine, &id).await.unwrap();
+        assert_eq!(followed[0].steps.len(), 6);
+        assert_eq!(followed[0].steps[0].period.start, start);
+        assert_eq!(chosen_start(&store, &id).await.unwrap(), Some(start));
+        // The same as if nothing had been missing.
+        let (_folder, whole) = folder_store();
+        put(&whole, &year).await;
+        let engine = Engine::local(whole);
+        let at_once = derive_accumulated(&engine, &id, Some(start), &|_progress| ()).await;
+        assert_eq!(seen(&followed[0]), seen(&at_once.unwrap()));
+    }
 }

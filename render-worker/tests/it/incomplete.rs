@@ -31,6 +31,7 @@ async fn carbon(store: &Store, name: &str, lacking_cols: usize) -> Manifest {
                 .await
                 .unwrap(),
             complete_cells: counts.complete_cells(),
+            since: None,
         });
     }
     manifest.number += 1;
@@ -156,6 +157,7 @@ async fn where_accumulation_starts_what_the_first_step_lacks_is_hatched_at_once(
             .await
             .unwrap(),
         complete_cells: counts.complete_cells(),
+        since: None,
     });
     carbon.steps = vec![first];
     let service = Here::new(store, Backend::Cpu);
