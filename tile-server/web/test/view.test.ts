@@ -1,11 +1,13 @@
 //! The shareable address, series values, cross-fades, ticks and files: pure parts of what the page shows.
 import { afterEach, describe, expect, it } from "vitest";
+import type { Quantity } from "../src/api/types";
 import { MODES } from "../src/api/words";
 import { underOpacity } from "../src/globe/fade";
 import { tickTexts, ticksOf } from "../src/look/legend";
 import { rowTexts } from "../src/panels/budget";
 import { budgetCsv, seriesCsv } from "../src/panels/csv";
-import { hasData, missingText, samplesOf, valueAt } from "../src/panels/series";
+import { hasData, heldAt, heldSamplesOf, missingText, samplesOf, valueAt } from "../src/panels/series";
+import { isLinear } from "../src/state/catalogue";
 import { decodeHash, encodeHash } from "../src/state/hash";
 import { INITIAL, type State, Store } from "../src/state/store";
 
@@ -109,6 +111,28 @@ describe("a series", () => {
     expect(valueAt(samples, 250)).toBeNull();
     expect(valueAt(samples, 100)).toBe(20);
     expect(valueAt(samples, 200)).toBeNull();
+  });
+
+  it("of codes holds each from its start to its end", () => {
+    const months = ["01", "02", "03"].map((month) => `2000-${month}-01T00:00:00Z`);
+    const row = (from: number, value: number) => ({
+      start: months[from] as string,
+      mid: months[from] as string,
+      end: months[from + 1] as string,
+      value,
+    });
+    const codes = heldSamplesOf([row(0, 1), row(1, 5)]);
+    const at = (time: string) => heldAt(codes, Date.parse(time));
+    expect(at("1999-07-01")).toBe(1);
+    expect(at("2000-01-31T23:00:00Z")).toBe(1);
+    expect(at("2000-02-01")).toBe(5);
+    expect(at("2001-01-01")).toBe(5);
+    expect(heldAt([], 0)).toBeNull();
+    const open = { name: "basin", title: "Basin", unit: "1" };
+    expect(isLinear({ ...open, flags: [{ value: 1, meaning: "pacific" }] } as Quantity)).toBe(false);
+    expect(isLinear({ ...open, unit: "degree" } as Quantity)).toBe(false);
+    expect(isLinear({ ...open, unit: "degree_C" } as Quantity)).toBe(true);
+    expect(isLinear("carbon_flux")).toBe(true);
   });
 
   it("of gaps alone has no data", () => {

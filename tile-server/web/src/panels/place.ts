@@ -7,13 +7,13 @@ import { el, icon, saveText } from "../page/dom";
 import { chemistry, latText, lonText, unitText, valueText } from "../page/format";
 import { DOWNLOAD } from "../page/icons";
 import type { Place } from "../state/camera";
-import { holdsAt } from "../state/catalogue";
+import { holdsAt, isLinear } from "../state/catalogue";
 import type { Store } from "../state/store";
 import { clampToRange, formatInstant, parseSteps, quantise, rangeOf, type Step } from "../time/steps";
 import { type Chart, seriesChart } from "./chart";
 import { seriesCsv } from "./csv";
 import { manifestLine } from "./manifest";
-import { hasData, missingText, type Sample, samplesOf, valueAt } from "./series";
+import { hasData, heldAt, heldSamplesOf, missingText, type Sample, samplesOf, valueAt } from "./series";
 
 export interface PlaceContext {
   store: Store;
@@ -32,6 +32,7 @@ export class PlacePanel {
   #shown:
     | {
         samples: Sample[];
+        isBlended: boolean;
         unit: string;
         chart: Chart | undefined;
         value: HTMLElement;
@@ -104,7 +105,8 @@ export class PlacePanel {
 
   #draw(place: Place, answer: PointSeries): void {
     const holds = holdsAt(answer.quantity);
-    const samples = samplesOf(answer.series, holds);
+    const isBlended = isLinear(answer.quantity);
+    const samples = isBlended ? samplesOf(answer.series, holds) : heldSamplesOf(answer.series);
     const unit = unitText(answer.unit);
     const cell = el(
       "p",
@@ -171,7 +173,7 @@ export class PlacePanel {
       const steps = this.#context.steps();
       this.#context.store.set({ timeMs: quantise(steps, clampToRange(steps, timeMs)) });
     });
-    this.#shown = { samples, unit, chart, value, when, missing };
+    this.#shown = { samples, isBlended, unit, chart, value, when, missing };
     this.#drawNow();
   }
 
@@ -179,7 +181,7 @@ export class PlacePanel {
     const shown = this.#shown;
     const { timeMs } = this.#context.store.state;
     if (!shown || !Number.isFinite(timeMs)) return;
-    const value = valueAt(shown.samples, timeMs);
+    const value = (shown.isBlended ? valueAt : heldAt)(shown.samples, timeMs);
     shown.value.textContent = value === null ? "no data" : valueText(value, 3);
     shown.when.textContent = formatInstant(timeMs);
     shown.missing.textContent = missingText(shown.samples, timeMs);

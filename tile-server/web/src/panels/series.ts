@@ -23,6 +23,26 @@ export function samplesOf(series: PointSeries["series"], holdsAt: HoldsAt): Samp
   return [{ atMs: Date.parse(first.start), value: first.value === null ? null : 0 }, ...samples];
 }
 
+/** The same of values that have nothing between two of them: each holds from its start to its end. */
+export function heldSamplesOf(series: PointSeries["series"]): Sample[] {
+  return series.flatMap((row) => {
+    const { value } = row;
+    return [
+      { atMs: Date.parse(row.start), value },
+      { atMs: Date.parse(row.end) - 1, value },
+    ];
+  });
+}
+
+/** The one of two neighbouring samples that is nearer to an instant, where there is nothing between them; null is no data. */
+export function heldAt(samples: readonly Sample[], timeMs: number): number | null {
+  const after = samples.findIndex((sample) => sample.atMs >= timeMs);
+  const right = after < 0 ? samples.at(-1) : samples[after];
+  const left = samples[after - 1] ?? right;
+  if (!left || !right) return null;
+  return right.atMs - timeMs <= timeMs - left.atMs ? right.value : left.value;
+}
+
 /**
  * Value at an instant, linear between the two neighbouring samples as the renderer draws it (V1 + (V2 - V1)(T - T1)/(T2 - T1)).
  * Before the first and after the last sample the end value holds. A gap on either side gives null, except exactly on a sample.

@@ -18,6 +18,15 @@ export function holdsAt(quantity: Quantity): HoldsAt {
   return quantity === ACCUMULATED ? "end" : "mid";
 }
 
+/** Units of angles, lower case: those of directions. */
+const ANGLES = /^(°|(arc_)?degrees?|degrees?_?(true|t)|radians?|rad|deg)$/;
+
+/** Is there something between two of its values? Not of codes, and not of directions; pictures have those of one step. */
+export function isLinear(quantity: Quantity): boolean {
+  if (typeof quantity === "string") return true;
+  return !quantity.flags?.length && !ANGLES.test(quantity.unit.toLowerCase());
+}
+
 export class Catalogue {
   readonly products: readonly Product[];
   readonly #steps = new Map<string, readonly Step[]>();
