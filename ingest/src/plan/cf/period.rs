@@ -115,7 +115,7 @@ impl Covers {
 /// # Errors
 /// A date is no day of the real calendar, or the first one is not before the other.
 pub(crate) fn between(start: CalendarDate, end: CalendarDate) -> Result<Period, String> {
-    let (from, to) = (instant(start)?, instant(end)?);
+    let from = instant(start)?;
     let own_ms = end
         .count_ms()
         .zip(start.count_ms())
@@ -124,8 +124,11 @@ pub(crate) fn between(start: CalendarDate, end: CalendarDate) -> Result<Period, 
     let (from, to) = match own_ms {
         // With the day that it ends.
         Some(ms) if end.second <= 0.0 => (from, time(from.ms() + ms)?),
-        Some(ms) => (time(to.ms() - ms)?, to),
-        None => (from, to),
+        Some(ms) => {
+            let to = instant(end)?;
+            (time(to.ms() - ms)?, to)
+        }
+        None => (from, instant(end)?),
     };
     Period::new(from, to).map_err(|e| e.to_string())
 }
@@ -340,3 +343,6 @@ mod tests {
         }
     }
 }
+        // It ends where a day begins that is none.
+        let last = of(Calendar::AllLeap, 2, 28).unwrap().to_string();
+        assert_eq!(last, "2001-02-28T00:00:00Z/2001-03-01T00:00:00Z");
