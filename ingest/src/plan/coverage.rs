@@ -35,13 +35,8 @@ impl Coverage {
         let instant = |text: &str| period::instant(date::of_attribute(text)?).ok();
         let start = instant(text("time_coverage_start")?)?;
         let end = |name: &&str| {
-            let text = text(name)?;
-            let end = instant(text)?;
-            // A day without a time is its whole.
-            let day_ms = if date::names_a_day(text) { DAY_MS } else { 0 };
-            TimeMs::new(end.ms() + day_ms)
-                .ok()
-                .filter(|end| *end > start)
+            let end = date::end_of_attribute(text(name)?);
+            end.filter(|end| *end > start)
         };
         let end = ["time_coverage_end", "time_coverage_stop"]
             .iter()
