@@ -119,7 +119,8 @@ mod tests {
             let is_in_file = waiting.rows.lock().unwrap().is_rolled();
             assert_eq!(is_in_file, count == 20_000);
         }
-        let nowhere = Waiting::of(Path::new("/nowhere/at/all"), &vec![observation(0); 20_000]);
+        let many: Vec<Observation> = (0..20_000).map(observation).collect();
+        let nowhere = Waiting::of(Path::new("/nowhere/at/all"), &many);
         assert!(
             matches!(nowhere, Err(IngestError::Spool { .. })),
             "{nowhere:?}"

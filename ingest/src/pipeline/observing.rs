@@ -121,7 +121,7 @@ impl Pipeline<'_> {
             let stored = stored.map_err(|source| IngestError::Observations { source })?;
             let told = (file.file_name.as_str(), count as u64, file.masked);
             observation::put_note(self.store, &file.dataset, file.raw_sha256, told).await?;
-            Ok(stored)
+            Ok::<_, IngestError>(stored)
         };
         let stored = boundary::contained(work).await.flatten();
         running.done(ended(&stored));
