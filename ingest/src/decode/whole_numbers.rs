@@ -1,5 +1,5 @@
 //! Whole numbers of a file that are stored as they are: those that a float32 does not hold are refused where they are codes, of which
-//! each would become another one, and told of where they are not.
+//! each would become another one, and told of where they are not. Codes may be kept as numbers of floating point.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -27,11 +27,15 @@ pub(crate) struct WholeNumbers {
 }
 
 impl WholeNumbers {
-    /// Those of a plan; none of a variable whose numbers are shorter, have fractions, or become others.
+    /// Those of a plan; none of a variable whose numbers are shorter, have fractions and are no codes, or become others.
     pub(crate) fn of(plan: &Plan) -> Option<Self> {
-        let is_long = matches!(plan.variable.kind, Kind::Integer(4..) | Kind::Unsigned(4..));
         let stays = |step: &PlannedStep| is_identity(step.factor, step.offset);
         let (packing, quantity) = (&plan.packing, plan.target.quantity);
+        let is_long = match plan.variable.kind {
+            Kind::Integer(bytes) | Kind::Unsigned(bytes) => bytes >= 4,
+            Kind::Float(bytes) => bytes > 4 && !quantity.flags().is_empty(),
+            Kind::Text(_) | Kind::Other => false,
+        };
         let is_kept =
             is_long && is_identity(packing.scale, packing.offset) && plan.steps.iter().all(stays);
         // A count has the unit 1, and says so.
@@ -54,7 +58,9 @@ impl WholeNumbers {
         period: Period,
     ) -> Result<(), Rejection> {
         let mut lost = values.filter_map(|value| match value {
-            Unpacked::Value(value) => Some(value).filter(|value| !is_held(*value)),
+            Unpacked::Value(value) => {
+                Some(value).filter(|value| value.fract() == 0.0 && !is_held(*value))
+            }
             Unpacked::Missing | Unpacked::OutOfRange => None,
         });
         let Some(lost) = lost.next() else {
@@ -127,6 +133,8 @@ mod tests {
         for values in [
             [Unpacked::Value(even), Unpacked::Value(16_777_216.0)],
             [Unpacked::Missing, Unpacked::OutOfRange],
+            // No whole numbers.
+            [Unpacked::Value(0.1), Unpacked::Value(f64::NAN)],
         ] {
             assert_eq!(looked_at(true, &values), (Ok(()), None));
             assert_eq!(looked_at(false, &values), (Ok(()), None));

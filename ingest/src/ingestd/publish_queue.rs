@@ -1,4 +1,4 @@
-//! Files on their way: which may be published now, so that what must keep its order keeps it.
+//! Files on their way: which may be published now, or have their observations stored, so that what must keep its order keeps it.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -11,7 +11,8 @@ pub(super) type Number = u64;
 #[derive(Debug)]
 pub(super) struct PublishQueue<T> {
     files: BTreeMap<Number, File<T>>,
-    /// Products that are being published: one at a time each, so that a process does not race with itself.
+    /// Products that are being published, and datasets that observations are stored in: one at a time each, so that a process does not
+    /// race with itself.
     busy: BTreeSet<ProductId>,
 }
 

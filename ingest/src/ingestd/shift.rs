@@ -18,7 +18,7 @@ use tracing::Instrument as _;
 
 use super::publish_queue::{Number, PublishQueue};
 use super::retry::Caller;
-use super::work::{self, Done, Ended, Work, alongside};
+use super::work::{self, Done, Ended, Ready, Work, alongside};
 use super::{GROUP, IngestService, TOPIC, now};
 use crate::commit::{Claim, ClaimName};
 use crate::error::IngestError;
@@ -26,7 +26,6 @@ use crate::notice::{Answer, Outcome, PendingNotice};
 use crate::pipeline::metrics::{Metrics, class};
 use crate::pipeline::progress::Progress;
 use crate::pipeline::{Pipeline, Prepared};
-use crate::put::StoredGranule;
 
 /// How long notices are waited for while nothing is under way: bounds how late a stop is heard.
 const IDLE_WAIT: Duration = Duration::from_millis(250);
@@ -63,7 +62,7 @@ struct Shift<'a> {
     service: &'a IngestService,
     caller: Caller,
     pipeline: Pipeline<'a>,
-    publish_queue: PublishQueue<StoredGranule>,
+    publish_queue: PublishQueue<Ready>,
     jobs: BTreeMap<Number, Job>,
     open: BTreeMap<Number, Open>,
     next: Number,
@@ -343,7 +342,13 @@ impl<'a> Shift<'a> {
                 Done::Prepared(number, prepared) => match *prepared {
                     Prepared::ToCommit(granule) => {
                         let product = granule.product.clone();
-                        self.publish_queue.ready(number, product, granule);
+                        let ready = Ready::Granule(Box::new(granule));
+                        self.publish_queue.ready(number, product, ready);
+                    }
+                    Prepared::ToStore(file) => {
+                        let dataset = file.dataset.clone();
+                        let ready = Ready::Observed(Box::new(file));
+                        self.publish_queue.ready(number, dataset, ready);
                     }
                     Prepared::Answered(answer) => self.answered(number, answer),
                     Prepared::There(claim, answer) => self.there(number, claim, answer),
@@ -359,7 +364,7 @@ impl<'a> Shift<'a> {
                                 *newest = manifest.number.max(*newest);
                             }
                             Outcome::AlreadyLanded { .. } | Outcome::Superseded { .. } => {
-                                self.claim(claim);
+                                claim.into_iter().for_each(|claim| self.claim(claim));
                             }
                             Outcome::Rejected { .. } | Outcome::Observed { .. } => {}
                         }

@@ -29,6 +29,7 @@ mod table;
 mod table_columns;
 mod table_time;
 mod values;
+mod waiting;
 
 use contract::product::ProductId;
 
@@ -42,6 +43,7 @@ pub use note::{FileNote, notes};
 pub(crate) use recognise::{TextFormat, recognise, recognise_text};
 pub use sink::{ObservationSink, SinkCause, SinkError, Stored};
 pub(crate) use values::MAX_VALUES;
+pub(crate) use waiting::Waiting;
 
 /// Largest text file of observations, bytes: a ship's year every second has half of it.
 pub(crate) const MAX_TEXT_BYTES: u64 = 256 << 20;

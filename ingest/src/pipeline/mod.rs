@@ -29,6 +29,7 @@ use crate::plan::{self, PlannedGranule, Wish};
 use crate::put::{self, StoredGranule};
 use crate::settings::Settings;
 use metrics::Metrics;
+pub(crate) use observing::ObservedFile;
 use progress::{Progress, Stage};
 
 /// Times a file that changes under our hands is read again.
@@ -41,7 +42,9 @@ const TEXT_HEAD_BYTES: usize = 256 << 10;
 pub(crate) enum Prepared {
     /// To publish, with others of its product.
     ToCommit(StoredGranule),
-    /// Nothing is to be published: it is refused, or held observations, which are stored.
+    /// It holds observations, which are to be stored.
+    ToStore(ObservedFile),
+    /// It is refused.
     Answered(Answer),
     /// It is there, as far as no later files have its time. Files that were offered before it may still be on their way.
     There(Claim, Answer),
@@ -251,12 +254,17 @@ impl Pipeline<'_> {
             commit::run(self.store, granules, claims).await
         };
         let committed = boundary::contained(work).await.flatten();
-        running.done(match &committed {
-            Ok(_) => service::Outcome::Ok,
-            Err(error) if error.is_retryable() => service::Outcome::Retryable,
-            Err(_) => service::Outcome::Failed,
-        });
+        running.done(ended(&committed));
         committed
+    }
+}
+
+/// How an operation of the program ended.
+fn ended<T>(done: &Result<T, IngestError>) -> service::Outcome {
+    match done {
+        Ok(_) => service::Outcome::Ok,
+        Err(error) if error.is_retryable() => service::Outcome::Retryable,
+        Err(_) => service::Outcome::Failed,
     }
 }
 

@@ -1,12 +1,29 @@
-//! The way of a file of observations: read, and handed to their store.
+//! The way of a file of observations: read, and once it is its turn handed to their store.
 
+use std::sync::Arc;
+
+use contract::digest::Digest;
 use contract::event::RejectReason;
+use contract::masked::MaskedCells;
+use contract::product::ProductId;
 
-use super::{Pipeline, Prepared, Way};
-use crate::error::{IngestError, Rejection, Stop};
+use super::{Pipeline, Prepared, Way, ended};
+use crate::error::{IngestError, Rejection, Stop, boundary};
 use crate::fetch::RawGranule;
 use crate::inspect::InspectedGranule;
-use crate::observation::{self, Found, TextFormat};
+use crate::notice::{Answer, PendingNotice};
+use crate::observation::{self, Found, TextFormat, Waiting};
+
+/// A file of observations that is read: what it holds waits to be stored after those of files that were offered before.
+#[derive(Debug, Clone)]
+pub(crate) struct ObservedFile {
+    pub(crate) notice: Arc<PendingNotice>,
+    pub(crate) dataset: ProductId,
+    file_name: String,
+    raw_sha256: Digest,
+    masked: MaskedCells,
+    observations: Waiting,
+}
 
 impl Pipeline<'_> {
     /// Observations of a text file.
@@ -35,7 +52,7 @@ impl Pipeline<'_> {
         };
         let found = async { Ok(tokio::task::spawn_blocking(read).await??) };
         let found = self.metrics.timed("decode", found).await?;
-        self.store_observations(found, &raw, way).await
+        self.observed(found, &raw, way).await
     }
 
     /// Observations of a NetCDF file.
@@ -56,11 +73,11 @@ impl Pipeline<'_> {
         let read = observation::read(&mut session, &description, source);
         let found = self.metrics.timed("decode", read).await?;
         raw.check_unchanged()?;
-        self.store_observations(found, &raw, way).await
+        self.observed(found, &raw, way).await
     }
 
-    /// Stores what was found in a file, and then notes the file.
-    async fn store_observations(
+    /// Puts by what was found in a file.
+    async fn observed(
         &self,
         found: Found,
         raw: &RawGranule,
@@ -70,23 +87,46 @@ impl Pipeline<'_> {
             observations,
             masked,
         } = found;
-        let (Some(first), count) = (observations.first(), observations.len() as u64) else {
+        let Some(first) = observations.first() else {
             unreachable!("a file without observations is refused")
         };
         let dataset = first.dataset.clone();
-        let Some(sink) = self.observations else {
+        if self.observations.is_none() {
             let detail = "holds observations, and there is no place for them here";
             return Err(Rejection::new(RejectReason::NoVariable, "file", detail).into());
-        };
-        let put = async {
+        }
+        let spool = self.settings.spool.clone();
+        let put_by = move || Waiting::of(&spool, &observations);
+        Ok(Prepared::ToStore(ObservedFile {
+            notice: Arc::clone(way.notice),
+            dataset,
+            file_name: raw.file_name.clone(),
+            raw_sha256: raw.sha256,
+            masked,
+            observations: tokio::task::spawn_blocking(put_by).await??,
+        }))
+    }
+
+    /// Stores what a file holds, and then notes the file.
+    pub(crate) async fn store_observed(&self, file: &ObservedFile) -> Result<Answer, IngestError> {
+        let sink = self.observations;
+        let sink =
+            sink.expect("files of observations are refused where there is no place for them");
+        let running = self.metrics.start("put");
+        let _memory = self.gates.memory(file.observations.memory_bytes()).await;
+        let work = async {
+            let (waiting, count) = (file.observations.clone(), file.observations.count());
+            let observations = tokio::task::spawn_blocking(move || waiting.read()).await??;
             let stored = sink.put(observations).await;
             let stored = stored.map_err(|source| IngestError::Observations { source })?;
-            let told = (raw.file_name.as_str(), count, masked);
-            observation::put_note(self.store, &dataset, raw.sha256, told).await?;
-            Ok(stored)
+            let told = (file.file_name.as_str(), count as u64, file.masked);
+            observation::put_note(self.store, &file.dataset, file.raw_sha256, told).await?;
+            Ok::<_, IngestError>(stored)
         };
-        let stored = self.metrics.timed("put", put).await?;
-        let answer = way.notice.observed(dataset, stored, masked);
-        Ok(Prepared::Answered(answer))
+        let stored = boundary::contained(work).await.flatten();
+        running.done(ended(&stored));
+        let stored = stored?;
+        let dataset = file.dataset.clone();
+        Ok(file.notice.observed(dataset, stored, file.masked))
     }
 }

@@ -6,6 +6,7 @@ use contract::time::{Period, TimeMs};
 
 use crate::error::Rejection;
 use crate::plan::cf::calendar::{Calendar, CalendarDate};
+use crate::plan::cf::period;
 use crate::plan::profile::pattern;
 
 const DAY_MS: i64 = 86_400_000;
@@ -82,10 +83,18 @@ pub(super) fn of_attribute(text: &str) -> Option<CalendarDate> {
     time(day.and_time(NaiveTime::MIN).and_utc().timestamp_millis())
 }
 
-/// Does a text name a day and no time of it?
-pub(super) fn names_a_day(text: &str) -> bool {
+/// The first instant after what a text names, ISO 8601 or as people write it: a day, a month or a year without a time is its whole.
+pub(super) fn end_of_attribute(text: &str) -> Option<TimeMs> {
+    let named = period::instant(of_attribute(text)?).ok()?;
     let text = text.trim();
-    of_attribute(text).is_some() && matches!(text.len(), 8 | 10 | 11) && !text.contains(':')
+    let (year, month) = named.year_month();
+    let whole = match text.len() {
+        4 => Period::year(year),
+        7 => Period::month(year, month),
+        8 | 10 | 11 if !text.contains(':') => return TimeMs::new(named.ms() + DAY_MS).ok(),
+        _ => return Some(named),
+    };
+    Some(whole.ok()?.end)
 }
 
 /// The date in a file name that fits a pattern; `year` where the name has none.
@@ -167,8 +176,22 @@ mod tests {
         ] {
             assert_eq!(read(text), Some((2023, 12, 31, 43_200.0)), "{text}");
         }
-        assert!(names_a_day("20231231") && names_a_day("2023-12-31"));
-        assert!(!names_a_day("20231231T120000Z") && !names_a_day("2023"));
+    }
+
+    #[test]
+    fn a_day_a_month_and_a_year_end_after_their_whole() {
+        let end = |text| end_of_attribute(text).map(|end| end.to_string());
+        for (text, wanted) in [
+            ("20231231", "2024-01-01T00:00:00Z"),
+            ("2023-12-31", "2024-01-01T00:00:00Z"),
+            ("31-Dec-2023", "2024-01-01T00:00:00Z"),
+            ("2023-02", "2023-03-01T00:00:00Z"),
+            ("2023", "2024-01-01T00:00:00Z"),
+            ("20231231T120000Z", "2023-12-31T12:00:00Z"),
+        ] {
+            assert_eq!(end(text).as_deref(), Some(wanted), "{text}");
+        }
+        assert_eq!(end("soon"), None);
     }
 
     #[test]

@@ -65,9 +65,13 @@ fn of(variable: &Variable, packing: &Packing, steps: &[PlannedStep]) -> Result<V
             continue;
         };
         // As values of fields: of 32 bits.
-        let code = f64::from((value * factor + offset) as f32);
+        let exact = value * factor + offset;
+        let code = f64::from(exact as f32);
         if code.fract() != 0.0 || code.abs() > f64::from(i32::MAX) {
             return Err(format!("the code {code} is no whole number"));
+        }
+        if (exact - code).abs() > 0.5 {
+            return Err(format!("float32 holds {code} and not the code {exact}"));
         }
         flags.push(Flag {
             value: code as i32,
@@ -149,6 +153,11 @@ mod tests {
                 "a b",
                 vec![("flag_values", &[1.0, 2.5][..])],
                 "no whole number",
+            ),
+            (
+                "a b",
+                vec![("flag_values", &[1.0, 16_777_217.0][..])],
+                "not the code 16777217",
             ),
             ("a \u{1b}[2J", vec![values], "no meaning"),
             ("a 2", vec![values], "no meaning"),

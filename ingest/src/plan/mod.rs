@@ -255,15 +255,21 @@ impl Planning<'_> {
             .iter()
             .find(|a| a.role == Role::Time)
             .and_then(|a| a.coordinate.clone());
+        // When a forecast was begun is no time of its values.
+        let is_begin =
+            |v: &Variable| v.attributes.text("standard_name") == Some("forecast_reference_time");
         let is_scalar_time = |v: &&Variable| {
-            v.cell_count() == 1 && v.is_numeric() && coordinate::role_of(v) == Role::Time
+            let is_time = coordinate::role_of(v) == Role::Time && !is_begin(v);
+            v.cell_count() == 1 && v.is_numeric() && is_time
+        };
+        let is_called_so = |v: &&Variable| {
+            let name = v.attributes.text("standard_name").unwrap_or(&v.name);
+            name.eq_ignore_ascii_case("time")
         };
         on_axis.or_else(|| {
-            self.file
-                .variables
-                .iter()
-                .find(is_scalar_time)
-                .map(|v| v.name.clone())
+            let scalars = || self.file.variables.iter().filter(is_scalar_time);
+            let found = scalars().find(is_called_so).or_else(|| scalars().next());
+            found.map(|v| v.name.clone())
         })
     }
 }

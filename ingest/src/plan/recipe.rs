@@ -15,7 +15,10 @@ use crate::plan::profile::Profile;
 /// 5: steps of calendars of models are counted in these, codes that values cannot hold are refused, salinity is read in the units that
 ///    the conventions have for it, and notes tell of all this and of labels that are not evenly spaced; what this program exported is what it was, and a flux of CO2 that
 ///    no standard name names is one where unit, names and `positive` say all.
-pub(crate) const DECODER: u32 = 5;
+/// 6: composites of days end with their year, a stated length and the coverage of one step must agree, coverage ends after the month or
+///    year that it names, numbers in units are decimal, codes of floating point are held to what values can hold, cells that nobody wrote
+///    hold no data beside a `missing_value` too, and when a forecast was begun is no time of its values.
+pub(crate) const DECODER: u32 = 6;
 
 /// How a file was read.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]

@@ -145,13 +145,13 @@ async fn by_rules(
         year: rules.year.unwrap_or(stamp.year),
         ..stamp
     };
-    let period = |stamp| {
-        rules
-            .covers
-            .period_at(with_year(stamp), rules.stamp)
-            .map_err(|e| refused("time", e).into())
-    };
-    stamps.into_iter().map(period).collect()
+    let stamps: Vec<CalendarDate> = stamps.into_iter().map(with_year).collect();
+    let periods = rules.covers.periods_at(&stamps, rules.stamp);
+    let periods = periods.map_err(|e| refused("time", e))?;
+    if let Some(told) = rules.covers.told("time", &periods) {
+        planning.assume(told);
+    }
+    Ok(periods)
 }
 
 /// Time as CF has it: bounds, then `cell_methods`, the distance of stamps, and attributes about the coverage.
@@ -295,8 +295,12 @@ fn by_spacing(
             "{name}: has no bounds; {assumption} (if they are not, say stamp = \"middle\" or \"end\" in a profile)"
         ));
     }
-    let period = |stamp: &CalendarDate| covers.period_at(*stamp, at).map_err(|e| refused(name, e));
-    stamps.iter().map(period).collect()
+    let periods = covers.periods_at(stamps, at);
+    let periods = periods.map_err(|e| refused(name, e))?;
+    if let Some(told) = covers.told(name, &periods) {
+        planning.assume(told);
+    }
+    Ok(periods)
 }
 
 /// The steps with the conversion of each to the stored unit.

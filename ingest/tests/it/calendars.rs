@@ -147,4 +147,9 @@ async fn days_that_the_real_calendar_does_not_have_are_refused_with_the_date() {
     assert_refused(&days360(&[0.0, 1.0]), Some(&daily), &["no whole month"]).await;
     let leap = file("366_day", since, &[59.0, 60.0], None);
     assert_refused(&leap, None, &["time: ", "2001-02-29", "all_leap"]).await;
+    // The 28th ends where it begins.
+    for bounds in [None, Some(&[57.0, 58.0, 58.0, 59.0][..])] {
+        let (periods, _) = told(&file("366_day", since, &[57.5, 58.5], bounds)).await;
+        assert_eq!(periods[1], period("2001-02-28", "2001-03-01"), "{bounds:?}");
+    }
 }

@@ -16,6 +16,8 @@ use storage::log::{EmbeddedLog, EventLog};
 use crate::fixture::{Place, events, settings};
 
 const LINES: usize = 100;
+/// Lines of a file that takes far longer to read.
+const MANY_LINES: usize = 20_000;
 
 /// Hours of a buoy, of which the first ones have an air temperature that no air has.
 fn write(place: &Place, name: &str, hot: usize) -> PathBuf {
@@ -92,14 +94,7 @@ impl Station {
     /// Works until all notices are finished.
     async fn land(&self, file: PathBuf) {
         self.service.notify(&[file], None, None).await.unwrap();
-        let log = Arc::clone(&self.log);
-        let stop = async move {
-            let start = Instant::now();
-            while log.lag(Topic::GranuleNotice, "ingest").await.unwrap() > 0 {
-                assert!(start.elapsed() < Duration::from_mins(2));
-                tokio::time::sleep(Duration::from_millis(20)).await;
-            }
-        };
+        let stop = all_finished(Arc::clone(&self.log));
         self.service.run(&Quiet, stop).await.unwrap();
     }
 
@@ -118,6 +113,15 @@ impl Station {
         };
         let metric = family.get_metric().iter().find(is_it)?;
         Some(metric.get_counter().get_value())
+    }
+}
+
+/// Until no notice is left.
+async fn all_finished(log: Arc<EmbeddedLog>) {
+    let start = Instant::now();
+    while log.lag(Topic::GranuleNotice, "ingest").await.unwrap() > 0 {
+        assert!(start.elapsed() < Duration::from_mins(2));
+        tokio::time::sleep(Duration::from_millis(20)).await;
     }
 }
 
@@ -178,4 +182,64 @@ async fn observations_that_can_never_be_stored_refuse_their_file() {
     };
     assert!(detail.contains("numeric field overflow"), "{detail}");
     assert_eq!(notes(&station.place.store).await.unwrap(), vec![]);
+}
+
+/// Minutes of a buoy from the first of January on.
+fn write_minutes(place: &Place, name: &str, lines: usize) -> PathBuf {
+    let line = |minute: usize| {
+        let (day, hour, minute) = (minute / 1440 + 1, minute / 60 % 24, minute % 60);
+        format!("2012 01 {day:02} {hour:02} {minute:02}  5.5   6.1\n")
+    };
+    let lines: String = (0..lines).map(line).collect();
+    std::fs::create_dir_all(place.path(name)).unwrap();
+    let path = place.path(name).join("44005h2012.txt");
+    std::fs::write(&path, format!("#YY  MM DD hh mm WSPD  ATMP\n{lines}")).unwrap();
+    path
+}
+
+/// Notes how many observations it is given each time.
+#[derive(Default)]
+struct Counted(Mutex<Vec<usize>>);
+
+#[async_trait]
+impl ObservationSink for Counted {
+    async fn put(&self, observations: Vec<Observation>) -> Result<Stored, SinkError> {
+        self.0.lock().unwrap().push(observations.len());
+        Ok(Stored::default())
+    }
+}
+
+/// A file that was offered first is stored first, however long it takes to read: what a later one says of the same stays.
+#[tokio::test]
+async fn observations_are_stored_in_the_order_in_which_their_files_were_offered() {
+    let place = Place::new();
+    let files = [("first", MANY_LINES), ("second", LINES)]
+        .map(|(name, lines)| write_minutes(&place, name, lines));
+    // A service keeps the order of what is named the same.
+    for dataset in [None, Some("buoys".parse().unwrap())] {
+        let (counted, log) = (
+            Arc::new(Counted::default()),
+            Arc::new(EmbeddedLog::memory()),
+        );
+        let service = IngestService::new(
+            place.store.clone(),
+            Arc::clone(&log) as Arc<dyn EventLog>,
+            settings(),
+        )
+        .with_observations(Arc::clone(&counted) as Arc<dyn ObservationSink>);
+        service
+            .notify(&files, None, dataset.as_ref())
+            .await
+            .unwrap();
+        if dataset.is_some() {
+            service
+                .run(&Quiet, all_finished(Arc::clone(&log)))
+                .await
+                .unwrap();
+        } else {
+            assert_eq!(service.drain(&Quiet).await.unwrap().len(), 2);
+        }
+        let counts = counted.0.lock().unwrap().clone();
+        assert_eq!(counts, [2 * MANY_LINES, 2 * LINES], "{dataset:?}");
+    }
 }

@@ -307,6 +307,19 @@ async fn codes_that_values_cannot_hold_are_refused_and_other_numbers_are_told_of
     let manifest = place.newest("a").await;
     assert_eq!(place.values(&manifest, 0).await[0], 16_777_216.0);
 
+    // Codes of floating point are told by their meanings.
+    let doubles = |code| Made::new("basin", &["lat", "lon"], Values::Doubles(vec![code; 32]));
+    let named = |code| {
+        let codes = doubles(code).says("flag_values", Says::Doubles(&[1.0, 2.0]));
+        MadeFile::days(1).with(codes.text("flag_meanings", "north south"))
+    };
+    let said = refused(&named(16_777_217.0)).await;
+    assert!(said.contains("basin: has the code 16777217"), "{said}");
+    for file in [named(16_777_218.0), MadeFile::days(1).with(doubles(0.1))] {
+        let outcome = land(&Place::new(), &file).await;
+        assert!(!outcome.is_rejected(), "{outcome}");
+    }
+
     let depths = |depth| {
         let values = Values::Ints(vec![depth; 64]);
         let depths = Made::new("depth_of_shot", &["time", "lat", "lon"], values);

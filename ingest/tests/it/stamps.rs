@@ -320,6 +320,9 @@ async fn coverage_that_means_what_it_says_stays() {
         ),
         ("2010-01-01", "2010-01-31", "2010-01-01", "2010-02-01"),
         ("20100101", "20100131", "2010-01-01", "2010-02-01"),
+        // So are a month and a year.
+        ("2010-01", "2010-03", "2010-01-01", "2010-04-01"),
+        ("2010", "2010", "2010-01-01", "2011-01-01"),
         // Days of their own, parts of a day.
         (
             "2010-01-01T03:00:00Z",
@@ -383,6 +386,94 @@ async fn one_stamp_and_the_coverage_must_agree() {
     assert_eq!(
         told(&lone.numbers("time", &[15.0]), None).await.1,
         Vec::<String>::new()
+    );
+}
+
+/// What is stated of the length of a step may be how far values are apart, and no more.
+#[tokio::test]
+async fn a_stated_length_and_the_coverage_must_agree() {
+    let file = |day: f64, resolution, [start, end]: [&'static str; 2]| {
+        MadeFile::sst(1)
+            .numbers("time", &[day])
+            .text("time_coverage_resolution", resolution)
+            .text("time_coverage_start", start)
+            .text("time_coverage_end", end)
+    };
+    let january = ["2001-01-01T00:00:00Z", "2001-02-01T00:00:00Z"];
+    for (day, resolution) in [(0.0, "P1D"), (0.0, "P1Y"), (3.0, "P8D")] {
+        assert_refused(
+            &file(day, resolution, january),
+            &[
+                "file: ",
+                "time_coverage_resolution",
+                "2001-02-01",
+                "profile",
+            ],
+        )
+        .await;
+    }
+    // As long, and elsewhere.
+    let between = ["2001-01-16T00:00:00Z", "2001-02-15T00:00:00Z"];
+    let (periods, assumptions) = told(&file(31.0, "P1M", between), None).await;
+    assert_eq!(periods, [period("2001-01-16", "2001-02-15")]);
+    assert!(assumptions[0].contains("length alone"), "{assumptions:?}");
+    // Within the step.
+    let noon = ["2001-01-01T10:00:00Z", "2001-01-01T13:30:00Z"];
+    let (periods, assumptions) = told(&file(0.5, "P1D", noon), None).await;
+    assert_eq!(periods, [period("2001-01-01", "2001-01-02")]);
+    assert!(assumptions[0].contains("lie within"), "{assumptions:?}");
+    // The last day by its midnight.
+    let days = ["2001-01-01T00:00:00Z", "2001-01-31T00:00:00Z"];
+    let month = vec![Period::month(2001, 1).unwrap()];
+    assert_eq!(told(&file(15.0, "P1M", days), None).await, (month, vec![]));
+}
+
+/// A map of a forecast has two times of one number each.
+#[tokio::test]
+async fn when_a_forecast_was_begun_is_no_time_of_its_values() {
+    let begun = Made::new(
+        "forecast_reference_time",
+        &["time"],
+        Values::Doubles(vec![-10.0]),
+    );
+    let begun = begun
+        .text("standard_name", "forecast_reference_time")
+        .text("units", "days since 2001-01-01");
+    let map = |v: Made| Made {
+        dimensions: vec!["lat", "lon"],
+        ..v
+    };
+    let mut file = MadeFile::sst(1).text("time_coverage_resolution", "P1D");
+    file.variables.insert(0, begun);
+    let (periods, _) = told(&file.but("sst", map), None).await;
+    assert_eq!(periods, [period("2001-01-01", "2001-01-02")]);
+}
+
+/// Those of eight days begin anew on the first of January, as their makers count them.
+#[tokio::test]
+async fn composites_of_days_end_with_their_year() {
+    let last = period("2001-12-27", "2002-01-01");
+    let days: Vec<f64> = (0..46).map(|step| f64::from(8 * step)).collect();
+    let year = MadeFile::sst(46).numbers("time", &days);
+    let stated = MadeFile::sst(1)
+        .numbers("time", &[360.0])
+        .text("time_coverage_resolution", "P8D");
+    let text = "name = 'p'\nproduct = 'p'\ntitle = 't'\nsource = 's'\nquantity = 'sea_surface_temperature'\n[variable]\nname = 'sst'\n[time]\nfrom = { variable = { name = 'time' } }\ncovers = '8 days'\n";
+    let profile = Profile::parse("p", text).unwrap();
+    let lone = MadeFile::sst(1).numbers("time", &[360.0]);
+    for (file, profile) in [(year, None), (stated, None), (lone, Some(&profile))] {
+        let (periods, assumptions) = told(&file, profile).await;
+        assert_eq!(periods.last(), Some(&last));
+        let is_told = |line: &String| line.contains("counted from 1 January: that from 2001-12-27");
+        assert!(assumptions.iter().any(is_told), "{assumptions:?}");
+    }
+    // Stamps that go on over New Year say so.
+    let on = MadeFile::sst(3).numbers("time", &[352.0, 360.0, 368.0]);
+    let (periods, assumptions) = told(&on, None).await;
+    assert_eq!(periods[1], period("2001-12-27", "2002-01-04"));
+    assert!(
+        !assumptions.iter().any(|line| line.contains("January")),
+        "{assumptions:?}"
     );
 }
 

@@ -15,3 +15,4 @@ pub(crate) mod projection;
 pub(crate) mod quantity;
 pub(crate) mod spacing;
 pub(crate) mod unmarked;
+mod year_end;

@@ -108,7 +108,8 @@ impl Packing {
             .flatten()
             .map(|fill| as_stored(variable.kind, fill))
             .collect();
-        if fills.is_empty() {
+        // Whatever else means no data: cells that nobody wrote hold it.
+        if attributes.numbers("_FillValue").is_none() {
             fills.extend(default_fill(variable.kind));
         }
         let is_unsigned = attributes
@@ -434,6 +435,11 @@ mod tests {
         assert_eq!(float.value(-999.0), -999.0);
         for (kind, fill) in [(SHORT, -32_767.0), (Kind::Unsigned(2), 65_535.0)] {
             assert!(Packing::of(&variable(kind, &[])).value(fill).is_nan());
+            let beside = [("missing_value", kind, &[9.0][..])];
+            let packing = Packing::of(&variable(kind, &beside));
+            assert!(packing.value(fill).is_nan() && packing.value(9.0).is_nan());
+            let own = [("_FillValue", kind, &[9.0][..])];
+            assert_eq!(Packing::of(&variable(kind, &own)).value(fill), fill);
         }
     }
 }

@@ -4,6 +4,7 @@ use contract::time::{Period, TimeMs};
 use serde::Deserialize;
 
 use super::calendar::CalendarDate;
+use super::year_end;
 use crate::inspect::file::description::Attributes;
 
 const DAY_MS: i64 = 86_400_000;
@@ -19,7 +20,7 @@ pub(crate) enum Covers {
     Month,
     /// The calendar year that holds the stamp.
     Year,
-    /// This many days from the start of the stamp's day.
+    /// This many days from the start of the stamp's day; the last of those that are counted from 1 January ends with its year.
     Days(u32),
     /// This many hours from the stamp.
     Hours(u32),
@@ -71,6 +72,41 @@ impl Covers {
         stamp: CalendarDate,
         at: Option<StampAt>,
     ) -> Result<Period, String> {
+        self.step(stamp, at, true)
+    }
+
+    /// The same of all stamps of a file, in its order. Days go on over New Year where the stamps do.
+    pub(crate) fn periods_at(
+        self,
+        stamps: &[CalendarDate],
+        at: Option<StampAt>,
+    ) -> Result<Vec<Period>, String> {
+        let steps = |ends_with_year: bool| {
+            let step = |stamp: &CalendarDate| self.step(*stamp, at, ends_with_year);
+            stamps.iter().map(step).collect::<Result<Vec<_>, _>>()
+        };
+        let whole = steps(false)?;
+        if year_end::is_passed(&whole) {
+            return Ok(whole);
+        }
+        steps(true)
+    }
+
+    /// What is told of steps of this length that are shorter, since they end with their year.
+    pub(crate) fn told(self, name: &str, steps: &[Period]) -> Option<String> {
+        match self {
+            Self::Days(days) => year_end::told(name, days, steps),
+            Self::Month | Self::Year | Self::Hours(_) => None,
+        }
+    }
+
+    /// The period of a stamp; days that are counted from 1 January end with their year, if they are to.
+    fn step(
+        self,
+        stamp: CalendarDate,
+        at: Option<StampAt>,
+        ends_with_year: bool,
+    ) -> Result<Period, String> {
         let after = |start: CalendarDate, ms: i64| between(start, later(start, ms)?);
         let named = match at {
             // An end is the first instant that does not belong to the period.
@@ -92,7 +128,10 @@ impl Covers {
                     Some(StampAt::Middle) => i64::from(count) / 2,
                     Some(StampAt::End) => i64::from(count) - 1,
                 };
-                after(later(first, -days * DAY_MS)?, i64::from(count) * DAY_MS)
+                let start = later(first, -days * DAY_MS)?;
+                let ms = i64::from(count) * DAY_MS;
+                let rest_ms = year_end::rest_ms(start, count).filter(|_| ends_with_year);
+                after(start, rest_ms.map_or(ms, |rest_ms| rest_ms.min(ms)))
             }
             (Self::Hours(count), at) => {
                 let ms = i64::from(count) * HOUR_MS;
@@ -115,17 +154,20 @@ impl Covers {
 /// # Errors
 /// A date is no day of the real calendar, or the first one is not before the other.
 pub(crate) fn between(start: CalendarDate, end: CalendarDate) -> Result<Period, String> {
-    let (from, to) = (instant(start)?, instant(end)?);
+    let from = instant(start)?;
     let own_ms = end
         .count_ms()
         .zip(start.count_ms())
         .map(|(end_ms, start_ms)| end_ms - start_ms)
         .filter(|ms| *ms <= DAY_MS && !start.calendar.is_real());
     let (from, to) = match own_ms {
-        // With the day that it ends.
+        // With the day that it ends: the next one may be a 29 February that the real calendar lacks.
         Some(ms) if end.second <= 0.0 => (from, time(from.ms() + ms)?),
-        Some(ms) => (time(to.ms() - ms)?, to),
-        None => (from, to),
+        Some(ms) => {
+            let to = instant(end)?;
+            (time(to.ms() - ms)?, to)
+        }
+        None => (from, instant(end)?),
     };
     Period::new(from, to).map_err(|e| e.to_string())
 }
@@ -323,6 +365,9 @@ mod tests {
             assert!(refused.starts_with(name), "{refused}");
         }
         assert!(of(Calendar::AllLeap, 3, 1).is_ok());
+        // It ends where a day begins that is none.
+        let last = of(Calendar::AllLeap, 2, 28).unwrap().to_string();
+        assert_eq!(last, "2001-02-28T00:00:00Z/2001-03-01T00:00:00Z");
         let month = CalendarDate {
             calendar: Calendar::Days360,
             ..stamp(2001, 2, 30)
@@ -330,6 +375,30 @@ mod tests {
         assert_eq!(
             Covers::Month.period(month).unwrap(),
             Period::month(2001, 2).unwrap()
+        );
+    }
+
+    #[test]
+    fn composites_of_days_end_with_their_year_unless_their_stamps_go_on() {
+        let eight = Covers::Days(8);
+        let cut = "2001-12-27T00:00:00Z/2002-01-01T00:00:00Z";
+        for (date, at) in [
+            (stamp(2001, 12, 27), None),
+            (stamp(2001, 12, 27), Some(StampAt::Start)),
+            (stamp(2001, 12, 31), Some(StampAt::Middle)),
+        ] {
+            assert_eq!(eight.period_at(date, at).unwrap().to_string(), cut);
+        }
+        let last = |stamps: &[CalendarDate]| {
+            let periods = eight.periods_at(stamps, None).unwrap();
+            (periods[0].to_string(), eight.told("time", &periods))
+        };
+        let (found, told) = last(&[stamp(2001, 12, 27), stamp(2002, 1, 1)]);
+        assert!(found == cut && told.is_some(), "{found} {told:?}");
+        let whole = "2001-12-27T00:00:00Z/2002-01-04T00:00:00Z".to_owned();
+        assert_eq!(
+            last(&[stamp(2001, 12, 27), stamp(2002, 1, 4)]),
+            (whole, None)
         );
     }
 

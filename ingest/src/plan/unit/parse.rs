@@ -73,12 +73,20 @@ fn plain_spelling(text: &str) -> String {
         Some(at)
             if plain[at..].chars().any(char::is_alphabetic)
                 && plain.ends_with(')')
-                && !plain[..at].trim_end().ends_with('/') =>
+                && !plain[..at].trim_end().ends_with('/')
+                && !is_scale(&plain[..at]) =>
         {
             plain[..at].to_owned()
         }
         _ => plain,
     }
+}
+
+/// Is it a number of something, as in "10^-6 (mol m-2)", and no unit that may be explained? The 1 of a plain number may.
+fn is_scale(text: &str) -> bool {
+    let is_number = |token: &Token| matches!(token, Token::Number(_) | Token::Power(_));
+    let is_one = matches!(text.trim().parse::<f64>(), Ok(1.0));
+    !is_one && tokens(text).is_ok_and(|tokens| tokens.iter().all(is_number))
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -99,7 +107,14 @@ fn tokens(text: &str) -> Result<Vec<Token>, String> {
         let c = chars[at];
         let start = at;
         at += 1;
+        // Right behind a word or a number digits are its power.
+        let is_apart = start == 0 || matches!(chars[start - 1], ' ' | '*' | '.' | '/' | '(' | '\t');
         match c {
+            '0'..='9' | '.' | '+' if is_apart && number_len(&chars[start..]) > 0 => {
+                at = start + number_len(&chars[start..]);
+                let digits: String = chars[start..at].iter().collect();
+                tokens.push(number_or_power(&digits, false)?);
+            }
             ' ' | '*' | '.' | '\t' => {}
             '/' => tokens.push(Token::Divide),
             '(' => tokens.push(Token::Open),
@@ -112,12 +127,7 @@ fn tokens(text: &str) -> Result<Vec<Token>, String> {
                     at += 1;
                 }
                 let digits: String = chars[start..at].iter().filter(|c| **c != '^').collect();
-                let after_word =
-                    start > 0 && !matches!(chars[start - 1], ' ' | '*' | '.' | '/' | '(');
-                tokens.push(number_or_power(
-                    &digits,
-                    c == '^' || c == '-' || after_word,
-                )?);
+                tokens.push(number_or_power(&digits, c == '^' || c == '-' || !is_apart)?);
             }
             _ if is_letter(c) => {
                 while at < chars.len() && is_letter(chars[at]) {
@@ -129,6 +139,39 @@ fn tokens(text: &str) -> Result<Vec<Token>, String> {
         }
     }
     Ok(tokens)
+}
+
+/// Characters of the decimal number that begins here, as in `2`, `2.5`, `.5`, `1e-3` and `1.E-03`; none if none does. A point behind
+/// which no digit follows, as in `10.m`, is none of its own.
+fn number_len(chars: &[char]) -> usize {
+    let digits = |from: usize| {
+        let rest = chars.get(from..).unwrap_or_default();
+        rest.iter().take_while(|c| c.is_ascii_digit()).count()
+    };
+    let is_at = |at: usize, these: [char; 2]| chars.get(at).is_some_and(|c| these.contains(c));
+    let exponent = |at: usize| {
+        if !is_at(at, ['e', 'E']) {
+            return 0;
+        }
+        let sign = usize::from(is_at(at + 1, ['+', '-']));
+        match digits(at + 1 + sign) {
+            0 => 0,
+            count => 1 + sign + count,
+        }
+    };
+    let first = usize::from(chars.first() == Some(&'+'));
+    let whole = digits(first);
+    let mut end = first + whole;
+    if chars.get(end) == Some(&'.') {
+        let parts = digits(end + 1);
+        if parts > 0 || whole > 0 && exponent(end + 1) > 0 {
+            end += 1 + parts;
+        }
+    }
+    if end == first {
+        return 0;
+    }
+    end + exponent(end)
 }
 
 fn is_letter(c: char) -> bool {
@@ -272,12 +315,14 @@ fn times(total: Unit, part: Unit, power: i8) -> Result<Unit, String> {
             amount: raise(a.amount, b.amount)?,
         })
     })();
-    // Inside a product a degree Celsius is a difference of temperature: the offset falls away.
     let factor = total.factor * part.factor.powi(power.into());
+    // Inside a product a degree Celsius is a difference of temperature: the offset falls away. A number of them is a scale of its own,
+    // from the same zero, as in UDUNITS: `0.01 degC`.
+    let is_scale = power == 1 && a == Dimension::default() && total.substance.is_none();
     Ok(Unit {
         dimension: dimension.ok_or(TOO_HIGH)?,
         factor: usable(factor)?,
-        offset: 0.0,
+        offset: if is_scale { part.offset } else { 0.0 },
         substance: total.substance.or(part.substance),
     })
 }

@@ -134,6 +134,54 @@ fn other_quantities_convert_to_their_stored_unit() {
 }
 
 #[test]
+fn numbers_in_units_are_decimal_and_a_point_between_words_is_none() {
+    for (spelling, factor) in [
+        ("1.0", 1.0),
+        ("2.5 m", 2.5),
+        (".5 m", 0.5),
+        ("+2.5m", 2.5),
+        ("0.001", 1e-3),
+        ("1e-3", 1e-3),
+        ("1.E-03", 1e-3),
+        ("1E3 m", 1e3),
+        ("10^-3 m", 1e-3),
+        ("m/0.5 s", 2.0),
+        ("10.m", 10.0),
+        ("1. m", 1.0),
+        ("m.2", 2.0),
+        ("m.s-1", 1.0),
+        ("kg.m-2.s-1", 1.0),
+        ("mol.m-2", 1.0),
+        ("m2.s-1", 1.0),
+    ] {
+        close(parse(spelling).unwrap().factor, factor);
+    }
+    let read = |spelling| parse(spelling).unwrap().dimension;
+    // What stands in brackets behind a number is what it is a number of; behind a unit it explains that.
+    assert_eq!(read("1e-6 (mol m-2)"), read("mol m-2"));
+    assert_eq!(read("1 (fraction of a cell)"), read("1"));
+    assert_eq!(read("kg.m-2.s-1"), read("kg m-2 s-1"));
+    assert_eq!(read("1e-3 mol.m-2"), read("mol m-2"));
+    for spelling in ["0.0", "1e-400", "1e999", "1e", "2.5.e"] {
+        assert!(parse(spelling).is_err(), "{spelling}");
+    }
+}
+
+/// As UDUNITS has it: 2000 of a hundredth of a degree are 20 °C.
+#[test]
+fn parts_of_a_degree_are_counted_from_its_zero_and_degrees_in_products_are_differences() {
+    let quantity = Quantity::SeaSurfaceTemperature;
+    let hundredths = parse("0.01 degC").unwrap().to_quantity(quantity, None);
+    let month = Period::month(2001, 1).unwrap();
+    let (factor, offset) = hundredths.unwrap().for_period(month).unwrap();
+    close(2000.0 * factor + offset, 293.15);
+    assert_eq!(canonical("0.01 degC"), None, "it may be of a difference");
+    for spelling in ["degC/day", "2.5 degC m-1", "m degC", "(degC) m-1"] {
+        assert!(parse(spelling).unwrap().offset.abs() <= 0.0, "{spelling}");
+    }
+}
+
+#[test]
 fn unknown_and_wrong_units_are_refused_by_name() {
     for (spelling, word) in [
         ("furlongs fortnight-1", "furlongs"),
