@@ -1,9 +1,10 @@
 //! Observations against a gridded product: the cell that holds each place, the step that holds each time, and how far the
 //! two differ in all.
 //!
-//! Values are compared in the stored unit of the product and told in the unit people read. Left out on purpose: which
-//! observations are fit for it (the caller's filter says so) and cells next to a cell without data.
+//! Values are compared in the stored unit of the product and told in the unit people read. Which observations are fit for it
+//! the caller says ([`Fit`]) before it compares them. Left out on purpose: cells next to a cell without data.
 
+mod fit;
 mod pair;
 mod scatter;
 pub mod statistics;
@@ -24,6 +25,7 @@ use crate::ComputeError;
 use pair::{Pair, Pairing};
 use statistics::Statistics;
 
+pub use fit::Fit;
 pub use scatter::scatter_svg;
 
 /// Which values of a product an observation's time is compared with.
@@ -64,6 +66,10 @@ pub struct MatchRow {
 /// Observations without a partner, by the first reason that applies.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct LeftOut {
+    /// Their quality is worse than asked for.
+    pub quality: u64,
+    /// They are deeper than asked for.
+    pub depth: u64,
     /// No step of the product covers their time.
     pub other_time: u64,
     /// They lie outside the grid.
@@ -97,6 +103,9 @@ pub struct Matchup {
     pub statistics: Statistics,
     /// What has no partner.
     pub left_out: LeftOut,
+    /// Which observations were fit for it; none where nobody chose among them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fit: Option<Fit>,
 }
 
 /// Compares observations of one property with a version of a product. Of its values the cells that they lie in are read, with what
@@ -159,6 +168,7 @@ pub fn matchup<'a>(
             time_match,
             statistics: Statistics::of(&values),
             left_out: out,
+            fit: None,
             rows,
         })
     })

@@ -120,6 +120,16 @@ impl Quality {
         Self::Bad,
     ];
 
+    /// Its name.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Good => "good",
+            Self::NotEvaluated => "not_evaluated",
+            Self::Questionable => "questionable",
+            Self::Bad => "bad",
+        }
+    }
+
     /// Its number in the primary scheme, 1 to 4.
     pub fn flag(self) -> u8 {
         match self {
@@ -138,6 +148,24 @@ impl Quality {
         let found = Self::ALL.into_iter().find(|quality| quality.flag() == flag);
         found.ok_or_else(|| {
             ContractError::invalid("quality flag", &flag.to_string(), "1, 2, 3 or 4")
+        })
+    }
+}
+
+impl Display for Quality {
+    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.as_str())
+    }
+}
+
+impl std::str::FromStr for Quality {
+    type Err = ContractError;
+
+    fn from_str(s: &str) -> Result<Self, Self::Err> {
+        let found = Self::ALL.into_iter().find(|quality| quality.as_str() == s);
+        found.ok_or_else(|| {
+            let valid = "good, not_evaluated, questionable or bad";
+            ContractError::invalid("quality", s, valid)
         })
     }
 }
@@ -243,5 +271,15 @@ mod tests {
             assert_eq!(Quality::from_flag(flag).unwrap().flag(), flag);
         }
         assert!(Quality::from_flag(9).is_err());
+    }
+
+    #[test]
+    fn qualities_are_named_alike_in_questions_and_answers() {
+        for quality in Quality::ALL {
+            let text = quality.to_string();
+            assert_eq!(text.parse::<Quality>().unwrap(), quality);
+            assert_eq!(serde_json::to_value(quality).unwrap(), text);
+        }
+        assert!("excellent".parse::<Quality>().is_err());
     }
 }

@@ -604,6 +604,24 @@ mod tests {
     }
 
     #[test]
+    fn the_worst_quality_and_the_greatest_depth_of_a_comparison_are_words_and_metres() {
+        let parse = |more: &str| {
+            let words = format!("fluxglobe observations matchup --product p {more}");
+            Cli::try_parse_from(words.split(' ')).map_err(|refused| refused.to_string())
+        };
+        assert!(parse("--worst questionable --deepest 200").is_ok());
+        for (wrong, word) in [
+            ("--worst excellent", "not_evaluated"),
+            ("--deepest deep", "metres"),
+        ] {
+            let refused = parse(wrong).unwrap_err();
+            assert!(refused.contains(word), "{refused}");
+        }
+        let listed = "fluxglobe observations query --worst good";
+        assert!(Cli::try_parse_from(listed.split(' ')).is_ok());
+    }
+
+    #[test]
     fn places_and_boxes_may_be_negative() {
         let words = [
             "fluxglobe",

@@ -145,6 +145,7 @@ mod tests {
             time_match: TimeMatch::Nearest,
             statistics: Statistics::of(&rows.iter().map(|r| (r.observed, r.gridded))),
             left_out: LeftOut::default(),
+            fit: None,
             rows,
         }
     }

@@ -111,11 +111,32 @@ async fn each_observation_meets_its_cell_and_month_and_the_rest_is_counted() {
         other_time: 1,
         outside: 1,
         no_data: 1,
+        ..LeftOut::default()
     };
     assert_eq!((found.left_out, found.unit.as_str()), (left_out, "°C"));
     // Differences 1, -3 and 0.
     near(found.statistics.bias, -2.0 / 3.0);
     near(found.statistics.rmse, (10.0f64 / 3.0).sqrt());
+}
+
+#[test]
+fn what_failed_a_test_or_lies_deep_is_not_held_against_a_surface() {
+    let at = |depth_m, quality| Observation {
+        depth_m,
+        quality,
+        ..observation("2010-01-10", 0.0, 45.0, 280.0)
+    };
+    let mut left_out = LeftOut::default();
+    let mut takes = |depth_m, quality| Fit::default().takes(&at(depth_m, quality), &mut left_out);
+    assert!(takes(10.0, Quality::Good) && takes(-10.0, Quality::NotEvaluated));
+    assert!(!takes(0.0, Quality::Questionable) && !takes(5.0, Quality::Bad));
+    assert!(!takes(2000.0, Quality::Bad) && !takes(10.5, Quality::Good));
+    assert_eq!((left_out.quality, left_out.depth), (3, 1));
+    let told = Fit::default().to_string();
+    assert_eq!(
+        told,
+        "at most 10 m deep and of quality not_evaluated or better"
+    );
 }
 
 #[tokio::test]

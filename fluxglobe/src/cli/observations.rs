@@ -1,7 +1,8 @@
 //! Words of `fluxglobe observations`.
 
 use clap::{Args, Subcommand, ValueEnum};
-use contract::observation::PlatformKind;
+use compute::matchup;
+use contract::observation::{PlatformKind, Quality};
 use contract::product::ProductId;
 use contract::time::TimeMs;
 
@@ -14,7 +15,8 @@ pub(crate) enum Observations {
     List(ObservationsAsked),
     /// The observations themselves, in the order of time.
     Query(ObservationsAsked),
-    /// Hold observations against a product: nearest cell, bias, RMSE, scatter plot.
+    /// Hold observations against a product: nearest cell, bias, RMSE, scatter plot. Those that failed a test or are deeper than 10 m
+    /// are left out unless told otherwise.
     Matchup(Matchup),
 }
 
@@ -42,6 +44,10 @@ pub(crate) struct ObservationsAsked {
     /// buoy, ship, station or profile.
     #[arg(long)]
     pub(crate) kind: Option<PlatformKind>,
+    /// Worst quality that counts: `good`, `not_evaluated`, `questionable` or `bad`. All count in lists unless one is given, in a
+    /// match-up those that are `not_evaluated` or better.
+    #[arg(long, value_name = "QUALITY")]
+    pub(crate) worst: Option<Quality>,
     /// Most observations, 1 to 1,000,000; of platforms (`list`) the first 10,000 at most.
     #[arg(long, default_value_t = 1000, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub(crate) limit: u32,
@@ -70,9 +76,18 @@ pub(crate) struct Matchup {
     /// How time is matched.
     #[arg(long, value_enum, default_value = "nearest")]
     pub(crate) time: MatchTime,
+    /// Deepest observation that counts, m below the surface; more for a product of a deeper level.
+    #[arg(long, value_name = "METRES", default_value_t = matchup::Fit::default().deepest_m, value_parser = depth_m)]
+    pub(crate) deepest: f64,
     /// Draw it too: what the product says over what was observed.
     #[arg(long, value_name = "FILE.svg|FILE.png")]
     pub(crate) plot: Option<PlotFile>,
     #[command(flatten)]
     pub(crate) asked: ObservationsAsked,
+}
+
+/// A depth in metres.
+fn depth_m(text: &str) -> Result<f64, String> {
+    let depth_m = text.parse().ok().filter(|depth: &f64| depth.is_finite());
+    depth_m.ok_or_else(|| "give metres below the surface, such as 10".to_owned())
 }

@@ -3,9 +3,9 @@
 use anyhow::{Result, bail};
 use comfy_table::presets::NOTHING;
 use comfy_table::{CellAlignment, Table};
-use compute::matchup::{self, LeftOut, TimeMatch};
+use compute::matchup::{self, Fit, LeftOut, TimeMatch};
 use contract::masked::MaskedCells;
-use contract::observation::{Filter, MAX_LIMIT, Observation};
+use contract::observation::{Filter, MAX_LIMIT, Observation, Quality};
 use observations::ObservationStore;
 
 use crate::cli::{MatchTime, Matchup, Observations, ObservationsAsked, Settings};
@@ -30,6 +30,7 @@ fn filter(asked: &ObservationsAsked) -> Result<Filter> {
         datasets: asked.dataset.clone().into_iter().collect(),
         platforms: asked.platform.clone().into_iter().collect(),
         kinds: asked.kind.into_iter().collect(),
+        worst: asked.worst.unwrap_or(Quality::Bad),
         limit: asked.limit.min(MAX_LIMIT),
         ..Filter::default()
     })
@@ -210,6 +211,47 @@ async fn all(
     }
 }
 
+/// Observations that are held against a product.
+struct Chosen {
+    observations: Vec<Observation>,
+    left_out: LeftOut,
+    /// Are these all that are fit?
+    is_all: bool,
+}
+
+/// Up to the limit, those that are fit, page by page.
+async fn chosen(
+    store: &dyn ObservationStore,
+    asked: &ObservationsAsked,
+    fit: Fit,
+) -> Result<Chosen> {
+    // What is not fit is counted: it is asked for, too.
+    let mut filter = Filter {
+        worst: Quality::Bad,
+        limit: MAX_LIMIT,
+        ..filter(asked)?
+    };
+    let (mut observations, mut left_out) = (vec![], LeftOut::default());
+    let most = asked.limit as usize;
+    loop {
+        let page = store.query(&filter).await?;
+        let mut rest = page.observations.into_iter();
+        let room = most - observations.len();
+        let taken = rest.by_ref().filter(|o| fit.takes(o, &mut left_out));
+        observations.extend(taken.take(room));
+        let is_last = page.next.is_none();
+        if is_last || observations.len() >= most {
+            let is_all = is_last && rest.next().is_none();
+            return Ok(Chosen {
+                observations,
+                left_out,
+                is_all,
+            });
+        }
+        filter.after = page.next;
+    }
+}
+
 async fn matchup(settings: &Settings, options: &Matchup) -> Result<()> {
     if options.asked.property.is_none() {
         bail!("say what is held against the product: --property, such as sea_surface_temperature");
@@ -217,19 +259,32 @@ async fn matchup(settings: &Settings, options: &Matchup) -> Result<()> {
     let store = deployment::store(settings)?;
     let manifest = deployment::manifest(&store, &options.product, &settings.data).await?;
     let found = observations::open(&options.asked.store, &store)?;
-    let (rows, is_all) = all(found.as_ref(), &options.asked).await?;
-    if rows.is_empty() {
+    let fit = Fit {
+        worst: options.asked.worst.unwrap_or(Fit::default().worst),
+        deepest_m: options.deepest,
+    };
+    let chosen = chosen(found.as_ref(), &options.asked, fit).await?;
+    if chosen.observations.is_empty() {
         check_dataset(found.as_ref(), &options.asked).await?;
+        if chosen.left_out != LeftOut::default() {
+            bail!(
+                "no observation is {fit}: {}; --worst and --deepest take others",
+                left_out(chosen.left_out)
+            );
+        }
     }
     let time = match options.time {
         MatchTime::Nearest => TimeMatch::Nearest,
         MatchTime::Linear => TimeMatch::Linear,
     };
-    let matched = matchup::matchup(&store, &manifest, &rows, time).await?;
+    let mut matched = matchup::matchup(&store, &manifest, &chosen.observations, time).await?;
+    matched.fit = Some(fit);
+    matched.left_out.quality = chosen.left_out.quality;
+    matched.left_out.depth = chosen.left_out.depth;
     if let Some(file) = &options.plot {
         plot::write(file, &matchup::scatter_svg(&matched)?)?;
     }
-    if !is_all {
+    if !chosen.is_all {
         progress::say(&cut(options.asked.limit));
     }
     if options.asked.json {
@@ -237,11 +292,11 @@ async fn matchup(settings: &Settings, options: &Matchup) -> Result<()> {
     }
     progress::result(&compared(&matched).to_string())?;
     progress::say(&format!(
-        "{} less {} at {} of {} observations; left out: {}",
+        "{} less {} at {} of {} observations, {fit}; left out: {}",
         matched.manifest,
         matched.property,
         matched.rows.len(),
-        rows.len(),
+        chosen.observations.len() as u64 + chosen.left_out.quality + chosen.left_out.depth,
         left_out(matched.left_out)
     ));
     progress::say(&manifest.source);
@@ -278,6 +333,8 @@ fn compared(matched: &matchup::Matchup) -> Table {
 /// Why observations have no partner, in words.
 fn left_out(out: LeftOut) -> String {
     let reasons = [
+        (out.quality, "of worse quality"),
+        (out.depth, "deeper"),
         (out.other_time, "at times that no step covers"),
         (out.outside, "outside the grid"),
         (out.no_data, "in cells without data"),
@@ -313,6 +370,8 @@ mod tests {
             other_time: 3,
             outside: 0,
             no_data: 2,
+            quality: 4,
+            depth: 0,
         };
         let pairs = [(20.0, 21.0), (22.0, 24.0)];
         let matched = matchup::Matchup {
@@ -327,6 +386,7 @@ mod tests {
             rows: vec![],
             statistics: Statistics::of(&pairs.into_iter()),
             left_out: left,
+            fit: Some(Fit::default()),
         };
         let text = compared(&matched).to_string();
         let words = |line: &str| line.split_whitespace().map(str::to_owned).collect();
@@ -342,7 +402,7 @@ mod tests {
         );
         assert_eq!(
             left_out(left),
-            "3 at times that no step covers, 2 in cells without data"
+            "4 of worse quality, 3 at times that no step covers, 2 in cells without data"
         );
         assert_eq!(left_out(LeftOut::default()), "none");
     }

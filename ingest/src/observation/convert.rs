@@ -6,6 +6,33 @@ use crate::plan::unit::{self, Unit};
 /// From here on numbers stand for no value: 1e35 and the like.
 const NO_NUMBER: f64 = 1e30;
 
+/// Share of the way from zero to the lowest value that can be true, beyond which nines below zero stand for no value: a wind of
+/// -99.9 m/s is none, a longitude of -99.9 is one.
+const UNMARKED_SHARE: f64 = 0.75;
+/// Words in names of properties that are differences: on the scale of a temperature their zero stays where it is.
+const DIFFERENCES: [&str; 20] = [
+    "anomaly",
+    "bias",
+    "correction",
+    "deviation",
+    "diff",
+    "difference",
+    "err",
+    "error",
+    "gradient",
+    "offset",
+    "precision",
+    "range",
+    "residual",
+    "rms",
+    "rmse",
+    "sd",
+    "spread",
+    "std",
+    "stddev",
+    "uncertainty",
+];
+
 /// How stored numbers become values: `value = number * factor + offset`.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Conversion {
@@ -35,7 +62,7 @@ impl Conversion {
         let known = property::known(name);
         let (unit, factor, offset) = match known {
             Some(property) => to_known(property, spelling)?,
-            None => to_common(spelling),
+            None => to_common(name, spelling),
         };
         Ok(Self {
             property: name.to_owned(),
@@ -49,6 +76,9 @@ impl Conversion {
     /// What a number of the file is.
     pub(super) fn given(&self, number: f64) -> Given {
         let value = number * self.factor + self.offset;
+        if self.is_unmarked(number, value) {
+            return Given::Missing;
+        }
         let can_be = self
             .known
             .is_none_or(|known| known.plausible.contains(&value));
@@ -59,6 +89,19 @@ impl Conversion {
         } else {
             Given::Implausible(value)
         }
+    }
+
+    /// Does a number that could be true stand for no value all the same? Nines below zero (-99, -99.9, -999) of what nothing is
+    /// known of, and of what is known those in the last quarter of its way down; 9999 and longer nines of what nothing is known
+    /// of.
+    fn is_unmarked(&self, number: f64, value: f64) -> bool {
+        let can_stand = match self.known {
+            Some(known) => {
+                number < 0.0 && value < UNMARKED_SHARE * known.plausible.start().min(0.0)
+            }
+            None => number <= -99.0 || number >= 9999.0,
+        };
+        can_stand && number.abs() < NO_NUMBER && stands_for_nothing(number)
     }
 
     /// What its values can be, for people.
@@ -116,12 +159,13 @@ fn to_known(property: &Property, spelling: &str) -> Result<(String, f64, f64), S
 }
 
 /// Unit, factor and offset for anything else: a common unit of the same kind, or the file's own.
-fn to_common(spelling: &str) -> (String, f64, f64) {
+fn to_common(name: &str, spelling: &str) -> (String, f64, f64) {
     let own = parse(spelling, spelling.starts_with("deg"));
     let common = own.ok().and_then(|own| {
-        COMMON_UNITS.into_iter().find_map(|name| {
-            let (factor, offset) = linear(own, unit::parse(name).ok()?)?;
-            Some((name.to_owned(), factor, offset))
+        COMMON_UNITS.into_iter().find_map(|common| {
+            let (factor, offset) = linear(own, unit::parse(common).ok()?)?;
+            let offset = if is_difference(name) { 0.0 } else { offset };
+            Some((common.to_owned(), factor, offset))
         })
     });
     common.unwrap_or_else(|| {
@@ -133,6 +177,12 @@ fn to_common(spelling: &str) -> (String, f64, f64) {
         }
         (kept, 1.0, 0.0)
     })
+}
+
+/// Is a property how far values are apart, by the words of its name?
+fn is_difference(name: &str) -> bool {
+    name.split('_')
+        .any(|word| DIFFERENCES.contains(&word) || word.ends_with("stdev"))
 }
 
 /// `value = number * factor + offset` from one unit to another of the same kind.
@@ -250,6 +300,54 @@ mod tests {
         );
         let hostile = Conversion::new("x", &"\u{1b}é".repeat(100)).unwrap();
         assert!(hostile.unit.len() <= 32 && !hostile.unit.chars().any(char::is_control));
+    }
+
+    #[test]
+    fn differences_of_temperatures_keep_their_zero() {
+        for name in [
+            "sea_water_temperature_standard_error",
+            "temp_air_stddev",
+            "sea_surface_temperature_anomaly",
+            "temp_uncertainty",
+        ] {
+            let conversion = Conversion::new(name, "degree_Celsius").unwrap();
+            assert_eq!(conversion.unit, "K");
+            assert_eq!(conversion.given(0.5), Given::Value(0.5), "{name}");
+        }
+        // A word is a word: this is no error.
+        let found = value("temperature_erratic", "degree_Celsius", 0.5).unwrap();
+        assert!((found - 273.65).abs() < 1e-9, "{found}");
+    }
+
+    #[test]
+    fn stand_ins_that_could_be_true_are_no_values_unless_such_values_are_common() {
+        for (property, unit, number) in [
+            ("nitrate", "umol kg-1", -999.0),
+            ("nitrate", "umol kg-1", -99.9),
+            ("nitrate", "umol kg-1", 9999.0),
+            ("eastward_wind", "m s-1", -99.9),
+            ("water_surface_height_above_reference_datum", "m", -99.0),
+        ] {
+            assert_eq!(
+                given(property, unit, number),
+                Given::Missing,
+                "{property} {number}"
+            );
+        }
+        for (property, unit, number) in [
+            ("nitrate", "umol kg-1", 9.9),
+            ("nitrate", "umol kg-1", -9.9),
+            ("oxygen", "umol kg-1", 99.0),
+            ("eastward_wind", "m s-1", -9.9),
+            ("eastward_sea_water_velocity", "cm s-1", -99.9),
+            ("longitude", "degree", -99.9),
+        ] {
+            let found = given(property, unit, number);
+            assert!(
+                matches!(found, Given::Value(_)),
+                "{property} {number}: {found:?}"
+            );
+        }
     }
 
     #[test]

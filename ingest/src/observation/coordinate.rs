@@ -1,6 +1,8 @@
 //! Coordinates of samples: for each cell of a measured variable, where, when, how deep and of which platform it is.
 
+use super::argo;
 use super::epic;
+use super::pressure;
 use super::sampling::Sampling;
 use super::values::read;
 use crate::error::Stop;
@@ -15,6 +17,8 @@ pub(super) enum Says {
     Latitude,
     Longitude,
     Depth,
+    /// How deep a sample is, by the pressure there.
+    Pressure,
 }
 
 /// Values of a coordinate and how to find that of a cell.
@@ -33,6 +37,10 @@ enum Index {
     Own(usize),
     /// The instance that the sample at this place belongs to.
     Instance(usize),
+    /// The ship or station of the cast at this place.
+    OwnerOfCast(usize),
+    /// The ship or station of the cast that the sample at this place belongs to.
+    Owner(usize),
     /// The dimension has one element.
     Only,
 }
@@ -43,11 +51,20 @@ impl Coordinate {
             let at = match index {
                 Index::Own(place) => cell[*place],
                 Index::Instance(place) => sampling.instance_of(cell[*place]),
+                Index::OwnerOfCast(place) => sampling.owner_of(cell[*place]),
+                Index::Owner(place) => sampling.owner_of(sampling.instance_of(cell[*place])),
                 Index::Only => 0,
             };
             at * stride
         };
         self.steps.iter().map(step).sum()
+    }
+
+    /// Does it say something of each index of the measured variable's dimension at this place?
+    pub(super) fn varies_along(&self, place: usize) -> bool {
+        let is_own =
+            |(index, _): &(Index, usize)| matches!(index, Index::Own(own) if *own == place);
+        self.steps.iter().any(is_own)
     }
 
     /// The value that belongs to a cell; NaN if there is none.
@@ -100,12 +117,22 @@ fn steps(
             .dimensions
             .iter()
             .position(|d| d.name.is_some() && d.name == dimension.name && d.len == dimension.len);
+        let place_of = |wanted: Option<&str>| {
+            let mut own = measured.dimensions.iter();
+            own.position(|d| d.name.is_some() && d.name.as_deref() == wanted)
+        };
+        let is_along =
+            |wanted: Option<&str>| wanted.is_some() && dimension.name.as_deref() == wanted;
+        let sample = || place_of(sampling.sample_dimension());
         let through = || {
-            let is_instance = dimension.name.as_deref() == sampling.instance_dimension();
-            let sample = measured.dimensions.iter().position(|d| {
-                d.name.is_some() && d.name.as_deref() == sampling.sample_dimension()
-            })?;
-            is_instance.then_some(Index::Instance(sample))
+            if is_along(sampling.instance_dimension()) {
+                return sample().map(Index::Instance);
+            }
+            if is_along(sampling.owner_dimension()) {
+                let cast = place_of(sampling.instance_dimension()).map(Index::OwnerOfCast);
+                return cast.or_else(|| sample().map(Index::Owner));
+            }
+            None
         };
         let index = own.map(Index::Own).or_else(through);
         let index = index.or((dimension.len == 1).then_some(Index::Only))?;
@@ -134,14 +161,17 @@ pub(super) async fn find(
             .dimensions
             .iter()
             .any(|d| d.name.as_deref() == Some(variable.name.as_str()));
+        let is_other = argo::is_adjusted(variable) != argo::is_adjusted(measured);
         // The more dimensions, the more exactly it says where a sample is.
-        (!is_named, !is_own, usize::MAX - variable.dimensions.len())
+        let inexact = usize::MAX - variable.dimensions.len();
+        (!is_named, !is_own, inexact, is_other)
+    };
+    let is_it = |v: &Variable| match what {
+        Says::Pressure => pressure::is_pressure(v),
+        _ => says(v) == Some(what),
     };
     let fits = |v: &&Variable| {
-        v.name != measured.name
-            && v.is_numeric()
-            && says(v) == Some(what)
-            && !epic::is_measured_place(v)
+        v.name != measured.name && v.is_numeric() && is_it(v) && !epic::is_measured_place(v)
     };
     let mut best = file.variables.iter().filter(fits).collect::<Vec<_>>();
     best.sort_by_key(|v| rank(v));

@@ -1,6 +1,7 @@
 //! Observations of one file as they are found, within the limits of the contract and of memory; what the file gives a
 //! value for and what is no observation is counted.
 
+use std::cmp::Ordering;
 use std::collections::BTreeMap;
 
 use contract::event::RejectReason;
@@ -30,6 +31,8 @@ pub(crate) struct Found {
 #[derive(Debug, Default)]
 pub(super) struct Gathered {
     found: Vec<Observation>,
+    /// How many were found before each variable, and its name.
+    variables: Vec<(usize, String)>,
     /// Values outside the valid range that the file states.
     out_of_range: u64,
     /// Values without a place or a time.
@@ -48,6 +51,11 @@ struct Tally {
 }
 
 impl Gathered {
+    /// What is taken from here on is of this variable.
+    pub(super) fn begin(&mut self, variable: &str) {
+        self.variables.push((self.found.len(), variable.to_owned()));
+    }
+
     /// Takes an observation; one that breaks a limit of the contract (a place past a pole, say) is counted and left out.
     pub(super) fn take(&mut self, observation: Observation) -> Result<(), Rejection> {
         if self.found.len() >= MAX_OBSERVATIONS {
@@ -99,13 +107,14 @@ impl Gathered {
 
     /// What was found. A file of which much cannot be true is refused, and one without any observation: `why` is the
     /// reason if no value was found at all.
-    pub(super) fn finish(self, why: Rejection) -> Result<Found, Rejection> {
+    pub(super) fn finish(mut self, why: Rejection) -> Result<Found, Rejection> {
+        self.tell_apart()?;
         let mut implausible = self.unplaced;
         for (property, tally) in &self.tallies {
             let all = tally.taken + tally.implausible;
             if tally.implausible as f64 > MAX_IMPLAUSIBLE_SHARE * all as f64 {
                 let detail = format!(
-                    "has {} of {all} values that cannot be true, such as {}; correct unit, fill value or places in the file",
+                    "has {} of {all} values that cannot be true, such as {}; correct unit, fill value, times or places in the file",
                     tally.implausible, tally.example
                 );
                 return Err(Rejection::new(RejectReason::Values, property, detail));
@@ -131,6 +140,80 @@ impl Gathered {
             masked,
         })
     }
+}
+
+impl Gathered {
+    /// Leaves out, and counts, observations that a later one of the same name says something else than: one of the two is
+    /// wrong, and only one can be kept.
+    ///
+    /// # Errors
+    /// They are of two variables: nothing says which of these is meant.
+    fn tell_apart(&mut self) -> Result<(), Rejection> {
+        let mut order: Vec<usize> = (0..self.found.len()).collect();
+        // Of one name the order of the file stays.
+        order.sort_by(|a, b| by_name(&self.found[*a], &self.found[*b]));
+        let is_same = |a: &usize, b: &usize| by_name(&self.found[*a], &self.found[*b]).is_eq();
+        let mut others = vec![];
+        for same in order.chunk_by(is_same) {
+            let last = same[same.len() - 1];
+            let is_other = |at: &&usize| says_other(&self.found[**at], &self.found[last]);
+            others.extend(same.iter().filter(is_other).map(|at| (*at, last)));
+        }
+        others.sort_unstable();
+        for (at, last) in &others {
+            let (own, kept) = (&self.found[*at], &self.found[*last]);
+            if let (Some(a), Some(b)) = (self.variable_of(*at), self.variable_of(*last))
+                && a != b
+            {
+                let detail = format!(
+                    "are both {} and differ at the same time, place and depth ({:e} and {:e} {} on {}); leave one of them out, or \
+                     give it a standard name of its own",
+                    own.property, own.value, kept.value, own.unit, own.time
+                );
+                let object = format!("{a} and {b}");
+                return Err(Rejection::new(RejectReason::Corrupt, object, detail));
+            }
+            let example = format!(
+                "two of {} on {} at {} m, {:e} and {:e} {}",
+                own.platform, own.time, own.depth_m, own.value, kept.value, own.unit
+            );
+            let property = own.property.clone();
+            let tally = self.tally(&property);
+            tally.taken -= 1;
+            tally.mask(|| example);
+        }
+        let mut at = 0;
+        let mut left_out = others.into_iter().map(|(at, _)| at).peekable();
+        self.found.retain(|_| {
+            at += 1;
+            left_out.next_if_eq(&(at - 1)).is_none()
+        });
+        Ok(())
+    }
+
+    /// The variable that an observation is of; none in a file that is no set of variables.
+    fn variable_of(&self, at: usize) -> Option<&str> {
+        let after = self.variables.partition_point(|(first, _)| *first <= at);
+        let (_, name) = &self.variables[after.checked_sub(1)?];
+        Some(name)
+    }
+}
+
+/// The order of the names of observations of one dataset.
+fn by_name(a: &Observation, b: &Observation) -> Ordering {
+    let by_depth = || a.depth_m.total_cmp(&b.depth_m);
+    let by_property = || a.property.cmp(&b.property);
+    let by_platform = || a.platform.cmp(&b.platform);
+    (a.time.cmp(&b.time))
+        .then_with(by_depth)
+        .then_with(by_property)
+        .then_with(by_platform)
+}
+
+/// Do two observations of one name differ in what they say?
+fn says_other(a: &Observation, b: &Observation) -> bool {
+    let said = |o: &Observation| [o.value, o.lon_deg, o.lat_deg].map(f64::to_bits);
+    said(a) != said(b)
 }
 
 impl Tally {
@@ -212,6 +295,90 @@ mod tests {
         for word in ["2 of 39", "4e2 K", "270", "325"] {
             assert!(refused.detail.contains(word), "{refused}");
         }
+    }
+
+    /// So many hours of one buoy.
+    fn hours(count: usize) -> Vec<Observation> {
+        let hour = |at: usize| Observation {
+            time: format!("2012-01-{:02}T{:02}:00:00Z", at / 24 + 1, at % 24)
+                .parse()
+                .unwrap(),
+            lon_deg: -170.0,
+            ..sst(290.0, 10.0)
+        };
+        (0..count).map(hour).collect()
+    }
+
+    #[test]
+    fn of_two_values_of_one_time_and_depth_the_later_is_kept_and_the_other_counted() {
+        let mut gathered = Gathered::default();
+        for observation in hours(40) {
+            gathered.take(observation).unwrap();
+        }
+        let again = hours(3).remove(2);
+        gathered.take(again.clone()).unwrap();
+        let warmer = Observation {
+            value: 291.0,
+            ..again.clone()
+        };
+        gathered.take(warmer.clone()).unwrap();
+        let deeper = Observation {
+            depth_m: 5.0,
+            ..warmer.clone()
+        };
+        gathered.take(deeper.clone()).unwrap();
+        let found = gathered.finish(why()).unwrap();
+        assert_eq!(found.masked.implausible, 2);
+        assert_eq!(found.observations.len(), 41);
+        assert_eq!(found.observations[39..], [warmer, deeper]);
+        assert!(!found.observations.contains(&again));
+    }
+
+    #[test]
+    fn many_values_of_one_time_or_one_time_at_many_places_refuse_the_file() {
+        for (value, lon_deg) in [(291.0, 190.0), (290.0, 191.0)] {
+            let mut gathered = Gathered::default();
+            let other = |o: Observation| Observation {
+                value,
+                lon_deg,
+                ..o
+            };
+            for observation in hours(30)
+                .into_iter()
+                .chain(hours(30).into_iter().map(other))
+            {
+                gathered.take(observation).unwrap();
+            }
+            let refused = gathered.finish(why()).unwrap_err();
+            assert_eq!(refused.reason, RejectReason::Values);
+            assert!(refused.detail.contains("30 of 60"), "{refused}");
+            assert!(
+                refused.detail.contains("two of 1 on 2012-01-01"),
+                "{refused}"
+            );
+        }
+    }
+
+    #[test]
+    fn two_variables_that_say_different_things_of_one_sample_refuse_the_file_with_both() {
+        let mut gathered = Gathered::default();
+        for (variable, value) in [("raw", 290.0), ("adjusted", 290.5)] {
+            gathered.begin(variable);
+            for observation in hours(2) {
+                gathered
+                    .take(Observation {
+                        value,
+                        ..observation
+                    })
+                    .unwrap();
+            }
+        }
+        let refused = gathered.finish(why()).unwrap_err();
+        assert_eq!(refused.object, "raw and adjusted");
+        assert!(
+            refused.detail.contains("sea_surface_temperature"),
+            "{refused}"
+        );
     }
 
     #[test]

@@ -2,16 +2,20 @@
 
 use contract::event::RejectReason;
 
+use super::argo;
 use super::convert::Conversion;
 use super::coordinate::{self, Coordinate, Says};
 use super::epic;
+use super::pressure;
 use super::property;
-use super::quality::Scheme;
+use super::quality::{self, Scheme};
+use super::recognise::Feature;
 use super::sampling::Sampling;
 use crate::error::{Rejection, Stop};
-use crate::inspect::file::description::{Description, Variable};
+use crate::inspect::file::description::{Description, Kind, Variable};
 use crate::inspect::reader::session::Session;
 use crate::plan::cf::calendar::{Calendar, TimeUnit};
+use crate::plan::method;
 use crate::plan::unit;
 
 /// A measured variable with all that its samples need.
@@ -24,12 +28,27 @@ pub(super) struct Measured<'a> {
     pub(super) longitude: Coordinate,
     pub(super) depth: Option<(Coordinate, ToDepth)>,
     pub(super) flags: Vec<(Coordinate, Scheme)>,
+    /// Mode of each cast of a float, where that says whether the variable counts.
+    pub(super) mode: Option<Coordinate>,
 }
 
 /// How a vertical coordinate becomes metres below the surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct ToDepth {
-    pub(super) factor: f64,
+pub(super) enum ToDepth {
+    /// It is a length, up or down.
+    Length { factor: f64 },
+    /// It is the pressure of the water.
+    Pressure { dbar_per_unit: f64 },
+}
+
+impl ToDepth {
+    /// Metres below the surface of a number of the coordinate.
+    pub(super) fn depth_m(self, number: f64, lat_deg: f64) -> f64 {
+        match self {
+            Self::Length { factor } => number * factor,
+            Self::Pressure { dbar_per_unit } => pressure::depth_m(number * dbar_per_unit, lat_deg),
+        }
+    }
 }
 
 /// Can it be a measured variable: numbers that are neither coordinates nor remarks?
@@ -41,6 +60,7 @@ pub(super) fn is_candidate(file: &Description, variable: &Variable) -> bool {
             .is_some_and(|name| name.ends_with("status_flag"))
         || [
             "flag_values",
+            "flag_masks",
             "sample_dimension",
             "instance_dimension",
             "cf_role",
@@ -108,7 +128,7 @@ pub(super) async fn prepare<'a>(
     session: &mut Session,
     file: &Description,
     variable: &'a Variable,
-    sampling: &Sampling,
+    (feature, sampling): (Feature, &Sampling),
 ) -> Result<Result<Measured<'a>, Rejection>, Stop> {
     let refuse = |reason, detail: String| Ok(Err(Rejection::new(reason, &variable.name, detail)));
     let Some(property) = property_of(variable) else {
@@ -135,11 +155,25 @@ pub(super) async fn prepare<'a>(
         Ok(unit) => unit,
         Err(wrong) => return Ok(Err(Rejection::new(RejectReason::Time, &time.name, wrong))),
     };
-    let depth = match depth(session, file, variable, sampling).await? {
+    if let Some(wrong) = no_value(variable, &property, &time.name) {
+        return refuse(RejectReason::Values, wrong);
+    }
+    let is_of_casts = feature.is_of_casts();
+    let depth = match depth(session, file, variable, (is_of_casts, sampling)).await? {
         Ok(depth) => depth,
         Err(rejection) => return Ok(Err(rejection)),
     };
+    let is_of_levels = || has_levels(variable, sampling, &[&time, &latitude, &longitude]);
+    if is_of_casts && depth.is_none() && is_of_levels() {
+        let detail = "has values at several depths, and nothing says which; give a depth in m, or sea_water_pressure in dbar";
+        return refuse(RejectReason::NoVariable, detail.to_owned());
+    }
+    let mode = match argo::mode(file, variable) {
+        Some(mode) => coordinate::beside(session, mode, variable, sampling).await?,
+        None => None,
+    };
     Ok(Ok(Measured {
+        mode,
         conversion,
         time,
         time_unit,
@@ -172,6 +206,32 @@ async fn place(
     coordinate::find(session, file, variable, sampling, what).await
 }
 
+/// What values of a variable are where they are not those of its property, by its `cell_methods`: they would be taken for them. A
+/// name of the file's own, and one that speaks of extremes itself (gusts), is what the file says.
+fn no_value(variable: &Variable, property: &str, time: &str) -> Option<String> {
+    let is_own =
+        variable.attributes.text("standard_name").is_none() && property::known(property).is_none();
+    let words = ["gust", "maximum", "minimum"];
+    if is_own || words.iter().any(|word| property.contains(word)) {
+        return None;
+    }
+    let (method, what) = method::other_over_time(variable, Some(time))?;
+    Some(format!(
+        "holds {what} over time (cell_methods {method:?}) and would be taken for {property} itself"
+    ))
+}
+
+/// Does a variable of casts have a dimension that is neither of their times nor of their places? Then it runs over depths, as
+/// the samples of ragged casts do.
+fn has_levels(variable: &Variable, sampling: &Sampling, known: &[&Coordinate]) -> bool {
+    let mut dimensions = variable.dimensions.iter().enumerate();
+    dimensions.any(|(place, dimension)| {
+        let is_of_samples =
+            dimension.name.is_some() && dimension.name.as_deref() == sampling.sample_dimension();
+        is_of_samples || !known.iter().any(|of| of.varies_along(place))
+    })
+}
+
 fn time_unit(file: &Description, name: &str) -> Result<TimeUnit, String> {
     let attributes = &file.variable(name).ok_or("is not in the file")?.attributes;
     let calendar = Calendar::parse(attributes.text("calendar"))?;
@@ -184,12 +244,13 @@ fn time_unit(file: &Description, name: &str) -> Result<TimeUnit, String> {
     TimeUnit::parse(attributes.text("units").ok_or("has no units")?, calendar)
 }
 
-/// The vertical coordinate of a variable: a depth of its own, or the file's.
+/// The vertical coordinate of a variable: a depth of its own, or the file's; of casts the pressure of the water, if there is no
+/// depth.
 async fn depth(
     session: &mut Session,
     file: &Description,
     variable: &Variable,
-    sampling: &Sampling,
+    (is_of_casts, sampling): (bool, &Sampling),
 ) -> Result<Result<Option<(Coordinate, ToDepth)>, Rejection>, Stop> {
     let own = epic::code_of(variable)
         .and_then(epic::meaning)
@@ -201,38 +262,51 @@ async fn depth(
             .find(|v| epic::code_of(v) == Some(own))
         && let Some(found) = coordinate::beside(session, beside, variable, sampling).await?
     {
-        return Ok(Ok(Some((found, ToDepth { factor: 1.0 }))));
+        return Ok(Ok(Some((found, ToDepth::Length { factor: 1.0 }))));
     }
-    let Some(found) = coordinate::find(session, file, variable, sampling, Says::Depth).await?
-    else {
+    let mut found = coordinate::find(session, file, variable, sampling, Says::Depth).await?;
+    if found.is_none() && is_of_casts {
+        found = coordinate::find(session, file, variable, sampling, Says::Pressure).await?;
+    }
+    let Some(found) = found else {
         return Ok(Ok(None));
     };
     let Some(vertical) = file.variable(&found.name) else {
         return Ok(Ok(None));
     };
+    Ok(match to_depth(vertical) {
+        Ok(to) => Ok(Some((found, to))),
+        Err(detail) => Err(Rejection::new(RejectReason::Unit, &found.name, detail)),
+    })
+}
+
+/// How the numbers of a vertical coordinate become depths, or what is wrong with its unit.
+fn to_depth(vertical: &Variable) -> Result<ToDepth, String> {
     let text = |name: &str| vertical.attributes.text(name).unwrap_or_default();
+    let spelling = text("units");
+    if pressure::is_pressure(vertical) {
+        let Some(dbar_per_unit) = pressure::dbar_per_unit(spelling) else {
+            return Err(format!(
+                "has unit {spelling:?}, which is none of pressure; give it in dbar, or depths in m"
+            ));
+        };
+        return Ok(ToDepth::Pressure { dbar_per_unit });
+    }
     let metre = |spelling: &str| {
         let (own, metre) = (unit::parse(spelling).ok()?, unit::parse("m").ok()?);
         (own.dimension == metre.dimension).then_some(own.factor)
     };
-    let spelling = if text("units").is_empty() {
-        "m"
-    } else {
-        text("units")
-    };
-    let Some(factor) = metre(spelling) else {
-        let detail = format!("has unit {spelling:?}, which is no length; give depths in m");
-        return Ok(Err(Rejection::new(RejectReason::Unit, &found.name, detail)));
+    let Some(factor) = metre(if spelling.is_empty() { "m" } else { spelling }) else {
+        return Err(format!(
+            "has unit {spelling:?}, which is no length; give depths in m"
+        ));
     };
     let is_up = text("positive").eq_ignore_ascii_case("up")
         || text("positive").is_empty() && matches!(text("standard_name"), "height" | "altitude");
     let sign = if is_up { -1.0 } else { 1.0 };
-    Ok(Ok(Some((
-        found,
-        ToDepth {
-            factor: sign * factor,
-        },
-    ))))
+    Ok(ToDepth::Length {
+        factor: sign * factor,
+    })
 }
 
 /// The flags that speak of a variable: those that it names, those of its EPIC code, or those named after it.
@@ -251,12 +325,13 @@ async fn flags(
         .and_then(epic::meaning)
         .map_or(&[][..], |code| code.flags);
     let mut found = vec![];
-    for flag in file.variables.iter().filter(|v| v.is_numeric()) {
+    for flag in file
+        .variables
+        .iter()
+        .filter(|v| v.is_numeric() || v.kind == Kind::Text(1))
+    {
         let is_named = ancillary.split_whitespace().any(|name| name == flag.name)
-            && flag
-                .attributes
-                .text("standard_name")
-                .is_none_or(|name| name.ends_with("status_flag"))
+            && quality::is_flag(flag)
             || flag.name.to_ascii_lowercase() == by_name;
         let code = epic::code_of(flag).filter(|code| epic::is_flag(*code) && codes.contains(code));
         let scheme = match (is_named, code) {
@@ -264,9 +339,24 @@ async fn flags(
             (false, Some(_)) => Scheme::TropicalArray,
             (false, None) => continue,
         };
-        if let Some(beside) = coordinate::beside(session, flag, variable, sampling).await? {
+        if let Some(mut beside) = coordinate::beside(session, flag, variable, sampling).await? {
+            if flag.kind == Kind::Text(1) {
+                for letter in &mut beside.values {
+                    *letter = digit(*letter);
+                }
+            }
             found.push((beside, scheme));
         }
     }
     Ok(found)
+}
+
+/// The digit that a letter is, as flags are written where they are letters; no number if it is none.
+fn digit(letter: f64) -> f64 {
+    let digit = letter - f64::from(b'0');
+    if (0.0..=9.0).contains(&digit) {
+        digit
+    } else {
+        f64::NAN
+    }
 }

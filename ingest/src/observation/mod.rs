@@ -7,9 +7,13 @@
 //! | NDBC standard meteorological text | its first line | columns; place from a table of stations |
 //! | SOCAT and PANGAEA tables, tab-separated | a line with latitude, longitude and time | columns |
 //!
+//! Samples lie at their depth in metres; casts that give the pressure of the water instead at the depth of that
+//! (`pressure.rs`). Casts that say neither are refused: all of their levels would be at the surface.
+//!
 //! NetCDF is read through the sandboxed reader; text is read here, by lines of bounded length. Left out on purpose:
 //! fields that a table calls interpolated or climatological (they are no measurements), and tables of gridded values.
 
+mod argo;
 mod convert;
 mod coordinate;
 mod epic;
@@ -19,6 +23,8 @@ mod name;
 mod ndbc;
 mod netcdf;
 mod note;
+mod points;
+mod pressure;
 mod property;
 mod quality;
 mod recognise;

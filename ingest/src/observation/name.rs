@@ -35,6 +35,13 @@ pub(super) fn platform(text: &str) -> Option<String> {
     (!name.is_empty()).then(|| name.to_owned())
 }
 
+/// A platform's name with a number behind it, not longer than it may be.
+pub(super) fn numbered(platform: &str, number: u32) -> String {
+    let end = format!("-{number}");
+    let room = platform.floor_char_boundary(MAX_PLATFORM_BYTES - end.len());
+    format!("{}{end}", &platform[..room])
+}
+
 /// Lower-case letters, digits and single dashes, beginning with a letter.
 fn slug(text: &str) -> String {
     let mut slug = String::new();
@@ -86,5 +93,7 @@ mod tests {
         assert_eq!(platform("a\nb").as_deref(), Some("ab"));
         assert_eq!(platform(&"é".repeat(100)).map(|n| n.len()), Some(64));
         assert_eq!(platform("\0 \n"), None);
+        assert_eq!(numbered("made", 12), "made-12");
+        assert_eq!(numbered(&"é".repeat(32), 12).len(), 63);
     }
 }

@@ -5,11 +5,13 @@ use contract::observation::{Observation, PlatformKind, Quality};
 use contract::product::ProductId;
 use contract::time::TimeMs;
 
+use super::argo;
 use super::convert::Given;
 use super::coordinate::Coordinate;
 use super::epic;
 use super::gather::{Found, Gathered};
 use super::measured::{self, Measured};
+use super::points::Points;
 use super::quality::{Verdict, worse};
 use super::recognise::{Feature, recognise};
 use super::sampling::Sampling;
@@ -26,6 +28,8 @@ struct Shared {
     dataset: ProductId,
     kind: PlatformKind,
     sampling: Sampling,
+    /// Single samples that nothing in the file tells apart.
+    points: Option<Points>,
 }
 
 /// Reads a file that [`recognise`] knows.
@@ -39,10 +43,13 @@ pub(super) async fn read(
                       give it with latitude, longitude and units (CF discrete sampling geometry)";
         return Err(Rejection::new(RejectReason::NoVariable, "file", detail).into());
     };
-    let shared = Shared {
+    let sampling = Sampling::of(session, file, feature, source).await?;
+    let is_of_points = feature == Feature::Point && sampling.is_nameless();
+    let mut shared = Shared {
         dataset: dataset(file, source),
         kind: kind(file, feature),
-        sampling: Sampling::of(session, file, source).await?,
+        sampling,
+        points: is_of_points.then(Points::default),
     };
     let mut gathered = Gathered::default();
     let mut passed_over = vec![];
@@ -51,8 +58,11 @@ pub(super) async fn read(
         .iter()
         .filter(|v| measured::is_candidate(file, v))
     {
-        match measured::prepare(session, file, variable, &shared.sampling).await? {
-            Ok(measured) => take(session, &measured, &shared, &mut gathered).await?,
+        match measured::prepare(session, file, variable, (feature, &shared.sampling)).await? {
+            Ok(measured) => {
+                gathered.begin(&variable.name);
+                take(session, &measured, &mut shared, &mut gathered).await?;
+            }
             Err(rejection) => passed_over.push(rejection),
         }
     }
@@ -112,7 +122,7 @@ fn kind(file: &Description, feature: Feature) -> PlatformKind {
 async fn take(
     session: &mut Session,
     measured: &Measured<'_>,
-    shared: &Shared,
+    shared: &mut Shared,
     gathered: &mut Gathered,
 ) -> Result<(), Stop> {
     let stored = read_stored(session, measured.variable).await?;
@@ -142,12 +152,16 @@ async fn take(
 /// Takes the observation of one cell, or counts why its number is none; unless its flag says that there is no value.
 fn sample(
     measured: &Measured<'_>,
-    shared: &Shared,
+    shared: &mut Shared,
     cell: &[usize],
     number: Unpacked,
     gathered: &mut Gathered,
 ) -> Result<(), Rejection> {
     let at = |coordinate: &Coordinate| coordinate.at(cell, &shared.sampling);
+    let mode = measured.mode.as_ref().map(at);
+    if mode.is_some_and(|mode| !argo::counts(measured.variable, mode)) {
+        return Ok(());
+    }
     let verdicts = measured
         .flags
         .iter()
@@ -173,28 +187,24 @@ fn sample(
             return Ok(());
         }
     };
-    let (time, lat_deg, lon_deg) = (
-        at(&measured.time),
-        at(&measured.latitude),
-        at(&measured.longitude),
-    );
-    if time.is_nan() || lat_deg.is_nan() || lon_deg.is_nan() {
+    let Some(place) = Place::of(measured, &shared.sampling, cell)? else {
         gathered.unplaced();
         return Ok(());
-    }
-    let depth_m = match &measured.depth {
-        Some((coordinate, to)) => at(coordinate) * to.factor,
-        None => 0.0,
+    };
+    let name = shared.sampling.name(measured.variable, cell);
+    let platform = match &mut shared.points {
+        Some(points) => points.name(&name, place.time, [place.lon_deg, place.lat_deg]),
+        None => name,
     };
     let is_longitude = conversion.property == "longitude";
     gathered.take(Observation {
         dataset: shared.dataset.clone(),
-        platform: shared.sampling.name(measured.variable, cell),
+        platform,
         kind: shared.kind,
-        time: instant(measured, time)?,
-        lon_deg,
-        lat_deg,
-        depth_m: if depth_m.is_nan() { 0.0 } else { depth_m },
+        time: place.time,
+        lon_deg: place.lon_deg,
+        lat_deg: place.lat_deg,
+        depth_m: place.depth_m,
         property: conversion.property.clone(),
         value: if is_longitude {
             contract::grid::wrap_lon_deg(value)
@@ -204,6 +214,49 @@ fn sample(
         unit: conversion.unit.clone(),
         quality,
     })
+}
+
+/// When and where a sample was taken.
+struct Place {
+    time: TimeMs,
+    lon_deg: f64,
+    lat_deg: f64,
+    depth_m: f64,
+}
+
+impl Place {
+    /// That of a cell; none where the file leaves a part of it open. Without a word of depths samples are at the surface, as are
+    /// those whose property says so.
+    fn of(
+        measured: &Measured<'_>,
+        sampling: &Sampling,
+        cell: &[usize],
+    ) -> Result<Option<Self>, Rejection> {
+        let at = |coordinate: &Coordinate| coordinate.at(cell, sampling);
+        let time = at(&measured.time);
+        let (lon_deg, lat_deg) = (at(&measured.longitude), at(&measured.latitude));
+        let said = measured.depth.as_ref();
+        let mut depth_m = said.map_or(0.0, |(depth, to)| to.depth_m(at(depth), lat_deg));
+        if depth_m.is_nan() && is_of_surface(&measured.conversion.property) {
+            depth_m = 0.0;
+        }
+        if [time, lon_deg, lat_deg, depth_m].iter().any(|n| n.is_nan()) {
+            return Ok(None);
+        }
+        Ok(Some(Self {
+            time: instant(measured, time)?,
+            lon_deg,
+            lat_deg,
+            depth_m,
+        }))
+    }
+}
+
+/// Does the name of a property say how deep it is?
+fn is_of_surface(property: &str) -> bool {
+    ["sea_surface_", "surface_"]
+        .iter()
+        .any(|start| property.starts_with(start))
 }
 
 fn instant(measured: &Measured<'_>, number: f64) -> Result<TimeMs, Rejection> {

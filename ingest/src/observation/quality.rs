@@ -6,6 +6,7 @@
 use contract::observation::Quality;
 
 use crate::inspect::file::description::Variable;
+use crate::plan::cf::flag::{self, Flag};
 
 /// What a flag says: a quality, or that there is no value.
 pub(super) type Verdict = Option<Quality>;
@@ -19,13 +20,24 @@ pub(super) enum Scheme {
     Woce,
     /// A variable that says itself what its values mean.
     Stated(Vec<(f64, Verdict)>),
+    /// One that says what its bits mean; what is set may be of several meanings.
+    Bits(Vec<(Flag, Verdict)>),
     /// The primary one.
     Primary,
 }
 
 impl Scheme {
-    /// The scheme of a CF status-flag variable, from `flag_values` and `flag_meanings`.
+    /// The scheme of a CF status-flag variable, from `flag_values`, `flag_masks` and `flag_meanings`. Bits without meanings
+    /// say nothing.
     pub(super) fn of(variable: &Variable) -> Self {
+        if variable.attributes.0.contains_key("flag_masks") {
+            let flags = flag::of(variable).unwrap_or_default();
+            let said = |state: Flag| {
+                let verdict = meaning(&state.name);
+                (state, verdict)
+            };
+            return Self::Bits(flags.into_iter().map(said).collect());
+        }
         let values = variable.attributes.numbers("flag_values");
         let meanings = variable.attributes.text("flag_meanings");
         match (values, meanings) {
@@ -57,9 +69,34 @@ impl Scheme {
                 .iter()
                 .find(|(value, _)| *value == flag)
                 .map_or(Some(Quality::NotEvaluated), |(_, verdict)| *verdict),
+            (Self::Bits(known), _) if flag.is_finite() => known
+                .iter()
+                .filter(|(state, _)| state.holds(flag))
+                .map(|(_, verdict)| *verdict)
+                .reduce(worse)
+                .unwrap_or(Some(Quality::NotEvaluated)),
             _ => Some(Quality::NotEvaluated),
         }
     }
+}
+
+/// Does a variable that another one names as ancillary speak of its quality? Errors, counts of samples and other numbers
+/// are ancillary too.
+pub(super) fn is_flag(variable: &Variable) -> bool {
+    if let Some(name) = variable.attributes.text("standard_name") {
+        return name.ends_with("status_flag")
+            || matches!(name, "quality_flag" | "aggregate_quality_flag");
+    }
+    let name = variable.name.to_ascii_lowercase();
+    let is_named = name.starts_with("qc_")
+        || ["_qc", "_flag", "_qf"]
+            .iter()
+            .any(|end| name.ends_with(end));
+    let states = ["flag_values", "flag_masks"];
+    is_named
+        || states
+            .iter()
+            .any(|name| variable.attributes.0.contains_key(*name))
 }
 
 /// The worse of two verdicts; no value is the worst.
@@ -102,6 +139,7 @@ fn meaning(word: &str) -> Verdict {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::inspect::file::description::{AttributeValue, Kind};
     use Quality::{Bad, Good, NotEvaluated, Questionable};
 
     #[test]
@@ -133,6 +171,62 @@ mod tests {
             ]
         );
         assert_eq!(Scheme::Primary.verdict(f64::NAN), Some(NotEvaluated));
+    }
+
+    fn variable(name: &str, attributes: &[(&str, AttributeValue)]) -> Variable {
+        let own = |(name, value): &(&str, AttributeValue)| ((*name).to_owned(), value.clone());
+        Variable {
+            name: name.to_owned(),
+            dimensions: vec![],
+            kind: Kind::Integer(1),
+            attributes: attributes.iter().map(own).collect(),
+        }
+    }
+
+    #[test]
+    fn bits_mean_what_is_said_of_each_and_the_worst_that_is_set_counts() {
+        let words = AttributeValue::Text("range_test_failed spike_suspect pump_on".to_owned());
+        let kind = Kind::Integer(1);
+        let bits = [1.0_f64, 2.0, 4.0].map(Into::into).to_vec();
+        let masks = AttributeValue::Numbers { kind, bits };
+        let scheme = Scheme::of(&variable(
+            "state",
+            &[("flag_masks", masks.clone()), ("flag_meanings", words)],
+        ));
+        let verdicts = [0.0, 1.0, 2.0, 3.0, 4.0, f64::NAN].map(|bits| scheme.verdict(bits));
+        assert_eq!(
+            verdicts,
+            [
+                Some(NotEvaluated),
+                Some(Bad),
+                Some(Questionable),
+                Some(Bad),
+                Some(NotEvaluated),
+                Some(NotEvaluated)
+            ]
+        );
+        // Nothing says what these mean: 4 is no "bad".
+        let unsaid = Scheme::of(&variable("state", &[("flag_masks", masks)]));
+        assert_eq!(unsaid.verdict(4.0), Some(NotEvaluated));
+    }
+
+    #[test]
+    fn errors_and_counts_are_no_flags() {
+        let named = |name: &str| {
+            let text = AttributeValue::Text(name.to_owned());
+            variable("beside", &[("standard_name", text)])
+        };
+        assert!(is_flag(&named("sea_water_temperature status_flag")));
+        assert!(is_flag(&named("aggregate_quality_flag")));
+        assert!(!is_flag(&named("sea_water_temperature standard_error")));
+        let kind = Kind::Integer(1);
+        let bits = vec![1.0_f64.into()];
+        let states = AttributeValue::Numbers { kind, bits };
+        assert!(is_flag(&variable("state", &[("flag_values", states)])));
+        assert!(is_flag(&variable("TEMP_QC", &[])));
+        for name in ["temp_uncertainty", "temp_count", "temp_std"] {
+            assert!(!is_flag(&variable(name, &[])), "{name}");
+        }
     }
 
     #[test]

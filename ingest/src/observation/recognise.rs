@@ -27,6 +27,16 @@ pub(crate) enum Feature {
     Unplaced,
 }
 
+impl Feature {
+    /// Are there values at several depths for one place and time?
+    pub(crate) fn is_of_casts(self) -> bool {
+        match self {
+            Self::Profile | Self::TimeSeriesProfile | Self::TrajectoryProfile => true,
+            Self::Point | Self::TimeSeries | Self::Trajectory | Self::Unplaced => false,
+        }
+    }
+}
+
 /// A text format of observations.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum TextFormat {

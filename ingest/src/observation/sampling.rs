@@ -1,8 +1,11 @@
 //! How the samples of a file belong to its platforms (CF conventions, chapter 9.3): ragged one behind the other, ragged by
-//! index, in rows, or all of one platform; and what the platforms are called.
+//! index, in rows, or all of one platform; and what the platforms are called. Samples of casts of ships and stations belong to
+//! their casts, and these to the ships or stations.
 
 use contract::event::RejectReason;
 
+use super::argo;
+use super::recognise::Feature;
 use super::values::{MAX_VALUES, read, read_stored};
 use super::{Source, name};
 use crate::error::{Rejection, Stop};
@@ -21,11 +24,46 @@ pub(super) struct Sampling {
     instance: Option<String>,
     /// Ragged files: the dimension that runs over samples, and the platform of each.
     ragged: Option<(String, Vec<u32>)>,
-    /// Names of the platforms, in their order.
+    /// Files of casts: the dimension that runs over the ships or stations, and whose each cast (the platforms above) is.
+    owners: Option<(String, Vec<u32>)>,
+    /// Names, in their order.
     names: Vec<String>,
+    named: Named,
+}
+
+/// Who has the names of a file.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+enum Named {
+    /// The platforms.
+    #[default]
+    Instances,
+    /// The ships or stations whose casts these are.
+    Owners,
+    /// The one ship or station of all samples.
+    One,
+    /// Nobody: there is no variable of names, and the file or its name says what all of it is of.
+    File,
 }
 
 impl Sampling {
+    /// Does nothing in the file tell its platforms apart?
+    pub(super) fn is_nameless(&self) -> bool {
+        self.named == Named::File
+    }
+
+    /// The dimension that runs over ships or stations whose casts these are.
+    pub(super) fn owner_dimension(&self) -> Option<&str> {
+        self.owners
+            .as_ref()
+            .map(|(dimension, _)| dimension.as_str())
+    }
+
+    /// The ship or station of a cast.
+    pub(super) fn owner_of(&self, instance: usize) -> usize {
+        let of = |(_, owners): &(String, Vec<u32>)| owners.get(instance).copied();
+        self.owners.as_ref().and_then(of).unwrap_or(0) as usize
+    }
+
     pub(super) fn instance_dimension(&self) -> Option<&str> {
         self.instance.as_deref()
     }
@@ -53,7 +91,16 @@ impl Sampling {
         };
         let own = place(self.instance_dimension()).map(|at| cell[at]);
         let through = || place(self.sample_dimension()).map(|at| self.instance_of(cell[at]));
-        let index = own.or_else(through).unwrap_or(0);
+        let instance = || own.or_else(through);
+        let index = match self.named {
+            Named::Instances | Named::File => instance().unwrap_or(0),
+            Named::Owners => {
+                let owner = place(self.owner_dimension()).map(|at| cell[at]);
+                let of_cast = || instance().map(|cast| self.owner_of(cast));
+                owner.or_else(of_cast).unwrap_or(0)
+            }
+            Named::One => 0,
+        };
         self.names
             .get(index)
             .cloned()
@@ -64,6 +111,7 @@ impl Sampling {
     pub(super) async fn of(
         session: &mut Session,
         file: &Description,
+        feature: Feature,
         source: Source<'_>,
     ) -> Result<Self, Stop> {
         let mut sampling = Self::default();
@@ -74,6 +122,11 @@ impl Sampling {
             let counts = read(session, variable).await?;
             let instances = contiguous(&variable.name, &counts, length(file, &samples))?;
             sampling.ragged = Some((samples, instances));
+            let of_casts = indices.filter(|(index, _)| dimension(index) == sampling.instance);
+            if let Some((variable, owner)) = of_casts {
+                let indices = read(session, variable).await?;
+                sampling.owners = Some((owner, indexed(&variable.name, &indices)?));
+            }
         } else if let Some((variable, instance)) = indices {
             sampling.instance = Some(instance);
             if let Some(samples) = dimension(variable) {
@@ -81,7 +134,7 @@ impl Sampling {
                 sampling.ragged = Some((samples, indexed(&variable.name, &indices)?));
             }
         }
-        let id = identifier(file);
+        let id = identifier(file, feature);
         sampling.names = match id {
             Some(id) => names(session, file, id).await?,
             None => lone_name(file, source),
@@ -93,7 +146,38 @@ impl Sampling {
                 sampling.names.len() as u64 == rows && rows > 1 || id.dimensions.len() == 2;
             sampling.instance = if is_rows { dimension(id) } else { None };
         }
+        sampling.named = match id {
+            Some(id) => sampling.named_by(id)?,
+            None => Named::File,
+        };
         Ok(sampling)
+    }
+
+    /// Who has the names of a variable.
+    fn named_by(&self, id: &Variable) -> Result<Named, Rejection> {
+        let own = dimension(id);
+        let is_along = |other: Option<&str>| own.is_some() && own.as_deref() == other;
+        if is_along(self.owner_dimension()) {
+            return Ok(Named::Owners);
+        }
+        if self.names.len() == 1 && !is_along(self.instance_dimension()) {
+            return Ok(Named::One);
+        }
+        let rows = id.dimensions.first().map(|d| d.len);
+        if let (Some(own), Some(instance), Some((_, of_samples))) =
+            (&own, &self.instance, &self.ragged)
+            && own != instance
+            && of_samples
+                .iter()
+                .any(|of| u64::from(*of) >= rows.unwrap_or(0))
+        {
+            let detail = format!(
+                "names platforms along {own:?}, and nothing says which of them each of {instance:?} belongs to; give its index in a \
+                 variable with instance_dimension = {own:?}"
+            );
+            return Err(corrupt(&id.name, detail));
+        }
+        Ok(Named::Instances)
     }
 }
 
@@ -162,15 +246,26 @@ fn indexed(name: &str, indices: &[f64]) -> Result<Vec<u32>, Rejection> {
     indices.iter().map(index).collect()
 }
 
-/// The variable that names platforms: of a station's or ship's casts it is the station or ship that is the platform.
-fn identifier(file: &Description) -> Option<&Variable> {
-    ["timeseries_id", "trajectory_id", "profile_id"]
+/// The variable that names platforms: of a station's or ship's casts it is the station or ship that is the platform. Single
+/// samples have no role for it; a variable of names says so by its standard name. Argo's has neither.
+fn identifier(file: &Description, feature: Feature) -> Option<&Variable> {
+    let with = |attribute: &'static str, text: &'static str| {
+        let mut all = file.variables.iter();
+        all.find(move |v| v.attributes.text(attribute) == Some(text))
+    };
+    let by_role = ["timeseries_id", "trajectory_id", "profile_id"]
         .into_iter()
-        .find_map(|role| {
-            file.variables
-                .iter()
-                .find(|v| v.attributes.text("cf_role") == Some(role))
-        })
+        .find_map(|role| with("cf_role", role));
+    let by_name = || {
+        ["platform_id", "platform_name"]
+            .into_iter()
+            .find_map(|name| with("standard_name", name))
+    };
+    by_role.or_else(|| match feature {
+        Feature::Point => by_name(),
+        _ if feature.is_of_casts() => file.variable(argo::PLATFORM),
+        _ => None,
+    })
 }
 
 /// Names of platforms: numbers, letters by platform, or texts.

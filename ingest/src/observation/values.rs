@@ -3,7 +3,7 @@
 use contract::event::RejectReason;
 
 use crate::error::{Rejection, Stop};
-use crate::inspect::file::description::{Part, Variable};
+use crate::inspect::file::description::{Kind, Part, Variable};
 use crate::inspect::reader::session::Session;
 use crate::plan::cf::packing::Packing;
 
@@ -31,6 +31,11 @@ pub(super) async fn read_stored(
     let lens: Vec<u64> = variable.dimensions.iter().map(|d| d.len).collect();
     if lens.contains(&0) {
         return Ok(vec![]);
+    }
+    // Letters are read whole.
+    if variable.kind == Kind::Text(1) {
+        let whole = vec![Part::All; lens.len()];
+        return session.read(&variable.name, &whole, cells as u64).await;
     }
     // Dimensions of one element cost nothing to fix.
     let long: Vec<usize> = (0..lens.len()).filter(|i| lens[*i] > 1).collect();

@@ -32,17 +32,10 @@ pub(super) fn check(
     quantity: Quantity,
     time: Option<&str>,
 ) -> Result<(), Rejection> {
-    let Some(text) = variable.attributes.text("cell_methods") else {
-        return Ok(());
-    };
     if matches!(quantity, Quantity::Open(_)) {
         return Ok(());
     }
-    let said = cell_methods::all_of_time(text, time.unwrap_or("time"));
-    let other = OTHERS
-        .iter()
-        .find(|(method, _)| said.iter().any(|words| words[0] == *method));
-    let Some((method, what)) = other else {
+    let Some((method, what)) = other_over_time(variable, time) else {
         return Ok(());
     };
     let detail = format!(
@@ -50,6 +43,19 @@ pub(super) fn check(
         quantity.title()
     );
     Err(Rejection::new(RejectReason::Values, &variable.name, detail))
+}
+
+/// The method along time whose values are not those of the variable's standard name, with the word for them; none if the variable
+/// says of no such one. `time` is the name of its time coordinate.
+pub(crate) fn other_over_time(
+    variable: &Variable,
+    time: Option<&str>,
+) -> Option<(&'static str, &'static str)> {
+    let text = variable.attributes.text("cell_methods")?;
+    let said = cell_methods::all_of_time(text, time.unwrap_or("time"));
+    OTHERS
+        .into_iter()
+        .find(|(method, _)| said.iter().any(|words| words[0] == *method))
 }
 
 #[cfg(test)]

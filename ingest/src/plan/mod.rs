@@ -8,7 +8,7 @@ mod coverage;
 mod date;
 mod edges;
 mod flags;
-mod method;
+pub(crate) mod method;
 mod model_calendar;
 mod place;
 pub(crate) mod profile;

@@ -78,14 +78,14 @@ pub(crate) async fn refusal(path: &Path) -> Rejection {
 }
 
 /// A NetCDF classic file in the making.
-struct Draft {
-    set: DataSet,
+pub(crate) struct Draft {
+    pub(crate) set: DataSet,
     numbers: Vec<(&'static str, Vec<f64>)>,
     letters: Vec<(&'static str, Vec<u8>)>,
 }
 
 impl Draft {
-    fn new(feature: &str, dimensions: &[(&str, usize)]) -> Self {
+    pub(crate) fn new(feature: &str, dimensions: &[(&str, usize)]) -> Self {
         let mut set = DataSet::new();
         set.add_global_attr_string("featureType", feature).unwrap();
         for (name, len) in dimensions {
@@ -98,7 +98,7 @@ impl Draft {
         }
     }
 
-    fn variable(
+    pub(crate) fn variable(
         mut self,
         name: &'static str,
         dimensions: &[&str],
@@ -114,19 +114,27 @@ impl Draft {
     }
 
     /// Names of two letters each.
-    fn names(mut self, dimension: &str, role: &str, names: &str) -> Self {
-        self.set
-            .add_var_u8("name", &[dimension, "letters"])
-            .unwrap();
-        self.set
-            .add_var_attr_string("name", "cf_role", role)
-            .unwrap();
-        self.letters.push(("name", names.bytes().collect()));
+    pub(crate) fn names(self, dimension: &str, role: &str, names: &str) -> Self {
+        self.letters("name", &[dimension, "letters"], &[("cf_role", role)], names)
+    }
+
+    pub(crate) fn letters(
+        mut self,
+        name: &'static str,
+        dimensions: &[&str],
+        attributes: &[(&str, &str)],
+        letters: &str,
+    ) -> Self {
+        self.set.add_var_u8(name, dimensions).unwrap();
+        for (attribute, text) in attributes {
+            self.set.add_var_attr_string(name, attribute, text).unwrap();
+        }
+        self.letters.push((name, letters.bytes().collect()));
         self
     }
 
     /// Longitude, latitude and time on one dimension each, 1-based tens, units and hours of an index.
-    fn axes(self, place: &str, time: &str, places: usize, times: usize) -> Self {
+    pub(crate) fn axes(self, place: &str, time: &str, places: usize, times: usize) -> Self {
         let run =
             |count: usize, scale: f64| (1..=count).map(|i| scale * i as f64).collect::<Vec<_>>();
         self.variable(
@@ -149,7 +157,7 @@ impl Draft {
         )
     }
 
-    fn write(self, folder: &Path) -> PathBuf {
+    pub(crate) fn write(self, folder: &Path) -> PathBuf {
         let path = folder.join("made.nc");
         let mut writer = FileWriter::open(&path).unwrap();
         writer.set_def(&self.set, Version::Classic, 0).unwrap();
@@ -164,7 +172,7 @@ impl Draft {
     }
 }
 
-const SST: &[(&str, &str)] = &[
+pub(crate) const SST: &[(&str, &str)] = &[
     ("standard_name", "sea_surface_temperature"),
     ("units", "degree_Celsius"),
     ("coordinates", "time lat lon"),

@@ -4,14 +4,14 @@ use axum::Json;
 use axum::extract::State;
 use axum::http::header;
 use axum::response::{IntoResponse as _, Response};
-use contract::observation::{Filter, MAX_LIMIT, Page};
+use contract::observation::{Filter, MAX_LIMIT, Page, Quality};
 use contract::product::ProductId;
 use serde::Deserialize;
 use utoipa::IntoParams;
 
 use crate::backend::Observe;
 use crate::error::ServerError;
-use crate::extract::{UrlPath, UrlQuery, time, whole_number};
+use crate::extract::{UrlPath, UrlQuery, parsed, time, whole_number};
 use crate::state::AppState;
 
 /// Observations of one answer unless told otherwise.
@@ -27,6 +27,9 @@ pub(crate) struct ObservationParameters {
     from: Option<String>,
     /// First instant after the period.
     to: Option<String>,
+    /// Worst quality that is still wanted; all are unless one is given.
+    #[param(value_type = Option<Quality>)]
+    worst: Option<String>,
     /// Most observations of the answer; 2000 unless told otherwise.
     #[param(value_type = Option<u32>, minimum = 1, maximum = 10000)]
     limit: Option<String>,
@@ -71,6 +74,7 @@ pub(crate) async fn get(
         datasets: vec![dataset.clone()],
         platforms: vec![platform],
         properties: asked.property.into_iter().collect(),
+        worst: parsed(asked.worst.as_deref())?.unwrap_or(Quality::Bad),
         limit,
         after: asked.after,
         ..Filter::default()

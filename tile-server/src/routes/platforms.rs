@@ -7,7 +7,7 @@ use axum::Json;
 use axum::extract::State;
 use axum::http::header;
 use axum::response::{IntoResponse as _, Response};
-use contract::observation::{Filter, Platform, PlatformKind, TrackPoint, TrackQuery};
+use contract::observation::{Filter, Platform, PlatformKind, Quality, TrackPoint, TrackQuery};
 use contract::region::Region;
 use serde::{Deserialize, Serialize};
 use utoipa::{IntoParams, ToSchema};
@@ -45,6 +45,9 @@ pub(crate) struct PlatformParameters {
     kind: Option<String>,
     /// Data set.
     dataset: Option<String>,
+    /// Worst quality of the observations that count; all do unless one is given.
+    #[param(value_type = Option<Quality>)]
+    worst: Option<String>,
 }
 
 /// Platforms as GeoJSON (RFC 7946).
@@ -160,6 +163,7 @@ impl PlatformParameters {
             datasets: parsed(self.dataset.as_deref())?.into_iter().collect(),
             kinds: parsed(self.kind.as_deref())?.into_iter().collect(),
             properties: self.property.clone().into_iter().collect(),
+            worst: parsed(self.worst.as_deref())?.unwrap_or(Quality::Bad),
             limit: MOST_PLATFORMS,
             ..Filter::default()
         })

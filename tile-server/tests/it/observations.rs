@@ -169,6 +169,22 @@ async fn a_series_tells_unit_and_quality_a_page_at_a_time() {
 }
 
 #[tokio::test]
+async fn the_worst_quality_that_is_wanted_may_be_said() {
+    let app = with_buoy().await;
+    for path in ["buoys/51001", "platforms"] {
+        let answer = app
+            .get(&format!("/api/observations/{path}?worst=not_evaluated"))
+            .await;
+        assert_eq!(answer.status, StatusCode::OK, "{path}");
+        assert_eq!(
+            app.observer.last_question().worst,
+            Quality::NotEvaluated,
+            "{path}"
+        );
+    }
+}
+
+#[tokio::test]
 async fn names_of_platforms_may_hold_anything() {
     let app = with_buoy().await;
     app.get("/api/observations/buoys/A%20B%2F..%2F%C3%A9%3Cb%3E")
@@ -185,6 +201,8 @@ async fn bad_questions_say_what_is_wrong_and_reach_nobody() {
         "platforms?from=yesterday",
         "platforms?kind=whale",
         "platforms?dataset=../secret",
+        "platforms?worst=excellent",
+        "buoys/51001?worst=2",
         "platforms?colour=red",
         "buoys/51001?limit=0",
         "buoys/51001?limit=10001",

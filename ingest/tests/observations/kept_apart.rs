@@ -1,0 +1,121 @@
+//! What must not be taken for one another: errors for flags, spreads for values, one variable, place or platform for another.
+
+use contract::observation::{Observation, Quality};
+
+use crate::made::{Draft, SST, observations, refusal, seen};
+
+/// One buoy with three hours of temperatures.
+fn buoy(attributes: &[(&str, &str)]) -> Draft {
+    let attributes: Vec<_> = SST.iter().chain(attributes).copied().collect();
+    Draft::new("timeSeries", &[("time", 3), ("place", 1)])
+        .axes("place", "time", 1, 3)
+        .variable("sst", &["time"], &attributes, vec![11.0, 12.0, 13.0])
+}
+
+async fn of(draft: Draft) -> Vec<Observation> {
+    let folder = tempfile::tempdir().unwrap();
+    observations(&draft.write(folder.path())).await
+}
+
+#[tokio::test]
+async fn errors_and_counts_beside_a_variable_are_no_flags_of_it() {
+    let beside = [("ancillary_variables", "sst_error sst_count")];
+    let draft = buoy(&beside)
+        .variable("sst_error", &["time"], &[], vec![4.0, 9.0, 3.0])
+        .variable("sst_count", &["time"], &[], vec![9.0, 4.0, 1.0]);
+    let found = of(draft).await;
+    assert_eq!(found.len(), 3);
+    assert!(found.iter().all(|o| o.quality == Quality::NotEvaluated));
+    let flagged = buoy(&[("ancillary_variables", "sst_flag")]).variable(
+        "sst_flag",
+        &["time"],
+        &[],
+        vec![4.0, 9.0, 1.0],
+    );
+    let qualities: Vec<Quality> = of(flagged).await.iter().map(|o| o.quality).collect();
+    assert_eq!(qualities, [Quality::Bad, Quality::Good]);
+}
+
+#[tokio::test]
+async fn spreads_and_extremes_are_not_taken_for_values() {
+    for methods in [
+        "time: standard_deviation",
+        "time: maximum (interval: 1 minute)",
+    ] {
+        let attributes: Vec<_> = SST
+            .iter()
+            .copied()
+            .chain([("cell_methods", methods)])
+            .collect();
+        let draft = buoy(&[("cell_methods", "time: mean")]).variable(
+            "other",
+            &["time"],
+            &attributes,
+            vec![1.0, 1.0, 1.0],
+        );
+        let values: Vec<i64> = seen(&of(draft).await).iter().map(|row| row.3).collect();
+        assert_eq!(values, [11, 12, 13], "{methods}");
+    }
+    // A gust is the highest value by its name.
+    let gust = [
+        ("standard_name", "wind_speed_of_gust"),
+        ("units", "m s-1"),
+        ("cell_methods", "time: maximum"),
+    ];
+    let found = of(buoy(&[]).variable("gust", &["time"], &gust, vec![5.0; 3])).await;
+    let gusts = found.iter().filter(|o| o.property == "wind_speed_of_gust");
+    assert_eq!(gusts.count(), 3);
+}
+
+#[tokio::test]
+async fn two_variables_of_one_name_that_differ_are_refused_with_both() {
+    let folder = tempfile::tempdir().unwrap();
+    let draft = buoy(&[]).variable("sst_2", &["time"], SST, vec![11.0, 12.5, 13.0]);
+    let refused = refusal(&draft.write(folder.path())).await;
+    assert_eq!(refused.object, "sst and sst_2", "{refused}");
+    // Those that say the same do not contradict each other.
+    let same = buoy(&[]).variable("sst_2", &["time"], SST, vec![11.0, f64::NAN, 13.0]);
+    assert_eq!(of(same).await.len(), 5);
+}
+
+/// Two samples of one instant at two places, and one of a later one.
+fn points() -> Draft {
+    Draft::new("point", &[("obs", 3), ("letters", 2)])
+        .variable(
+            "lon",
+            &["obs"],
+            &[("units", "degrees_east")],
+            vec![10.0, 20.0, 20.0],
+        )
+        .variable("lat", &["obs"], &[("units", "degrees_north")], vec![1.0; 3])
+        .variable(
+            "time",
+            &["obs"],
+            &[("units", "hours since 2000-01-01")],
+            vec![1.0, 1.0, 2.0],
+        )
+        .variable("sst", &["obs"], SST, vec![11.0, 12.0, 13.0])
+}
+
+#[tokio::test]
+async fn single_samples_of_one_instant_are_told_apart_by_their_places() {
+    let row = |name: &str, hour, lon, value| (name.to_owned(), hour, lon, value);
+    let expected = [
+        row("made", 1, 10, 11),
+        row("made", 2, 20, 13),
+        row("made-2", 1, 20, 12),
+    ];
+    assert_eq!(seen(&of(points()).await), expected);
+    let named = points().letters(
+        "ship",
+        &["obs", "letters"],
+        &[("standard_name", "platform_id")],
+        "aabbaa",
+    );
+    let expected = [
+        row("aa", 1, 10, 11),
+        row("aa", 2, 20, 13),
+        row("bb", 1, 20, 12),
+    ];
+    assert_eq!(seen(&of(named).await), expected);
+}
