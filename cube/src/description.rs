@@ -7,13 +7,14 @@ use contract::grid::Grid;
 use contract::manifest::{Manifest, ManifestId};
 use contract::product::ProductId;
 use contract::quantity::Quantity;
+use futures::future::BoxFuture;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
+use storage::{Store, manifests};
 use zarrs::group::Group;
 use zarrs::storage::AsyncReadableStorageTraits;
 
 use crate::CubeError;
-use crate::error::first_lines;
 
 /// Version of the layout of cubes, as it is written and read.
 const SCHEMA: u32 = 1;
@@ -38,8 +39,8 @@ pub struct Description {
     pub grid: Grid,
     /// The version that the cube is a copy of, if it is one.
     pub version: Option<ManifestId>,
-    /// What its values are over time of what it was made of; none of a product that is no statistic of another, and in cubes of before it was
-    /// kept.
+    /// What its values are over time of what it was made of, by [`storage::manifests::over_time`]; none of a product that is no statistic of
+    /// another, and in cubes of before it was kept.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub statistic: Option<MapStatistic>,
 }
@@ -48,14 +49,25 @@ impl Description {
     /// The attribute of the group, or of an exported file, that holds it.
     pub const ATTRIBUTE: &'static str = ATTRIBUTE;
 
-    /// The description of a version of a product.
-    pub fn of(manifest: &Manifest) -> Self {
-        Self::named(manifest, manifest.id())
+    /// The description of a version of a product in a store.
+    ///
+    /// # Errors
+    /// A version that it was made of and that cannot be read.
+    pub fn of<'a>(
+        store: &'a Store,
+        manifest: &'a Manifest,
+    ) -> BoxFuture<'a, Result<Self, CubeError>> {
+        Box::pin(async move { Self::named(store, manifest, manifest.id()).await })
     }
 
     /// The same for who knows the version's name, which takes longer to compute the more steps there are.
-    pub(crate) fn named(manifest: &Manifest, version: ManifestId) -> Self {
-        Self {
+    pub(crate) async fn named(
+        store: &Store,
+        manifest: &Manifest,
+        version: ManifestId,
+    ) -> Result<Self, CubeError> {
+        let over_time = manifests::over_time(store, manifest).await?;
+        Ok(Self {
             product: manifest.product.clone(),
             title: manifest.title.clone(),
             quantity: manifest.quantity,
@@ -63,8 +75,13 @@ impl Description {
             source: manifest.source.clone(),
             grid: manifest.grid,
             version: Some(version),
-            statistic: manifest.computed.as_ref().and_then(|it| it.how.statistic()),
-        }
+            statistic: over_time.map(|it| it.statistic),
+        })
+    }
+
+    /// Do its values add up since the first step, and not only begin where their step does? Accumulated carbon does, a statistic of it does not.
+    pub fn is_sum(&self) -> bool {
+        self.quantity == Quantity::AccumulatedCarbon && self.statistic.is_none()
     }
 
     /// Attributes of the group.
@@ -94,11 +111,7 @@ impl Description {
         S: AsyncReadableStorageTraits + 'static,
     {
         let group = Group::async_open(Arc::clone(store), "/").await;
-        let group = group.map_err(|e| CubeError::Foreign {
-            place: place.to_owned(),
-            array: "the group".to_owned(),
-            reason: first_lines(&e),
-        })?;
+        let group = group.map_err(|e| CubeError::foreign(place, "the group".to_owned(), e))?;
         Self::read(group.attributes(), place)
     }
 

@@ -16,7 +16,6 @@ use zarrs::storage::AsyncReadableStorageTraits;
 use zarrs_icechunk::AsyncIcechunkStore;
 
 use crate::arrays::{self, Definition, LEVELS};
-use crate::error::first_lines;
 use crate::joining::Method;
 use crate::rounding::KEPT_BITS;
 use crate::{CubeError, Description, Step, axis, cf, group, names, plain};
@@ -65,11 +64,7 @@ impl Levels {
             Err(e) => return Err(CubeError::library(place, "looking for levels", e)),
         }
         let group = Group::async_open(Arc::clone(store), &format!("/{LEVELS}")).await;
-        let group = group.map_err(|e| CubeError::Foreign {
-            place: place.to_owned(),
-            array: LEVELS.to_owned(),
-            reason: first_lines(&e),
-        })?;
+        let group = group.map_err(|e| CubeError::foreign(place, LEVELS.to_owned(), e))?;
         if group.attributes().get(ATTRIBUTE) != Some(&written(description)) {
             return Ok(Self {
                 is_foreign: true,
@@ -151,7 +146,7 @@ impl Levels {
         let names = after.iter().map(|own| own.map(|own| own.values_sha256));
         let names: Vec<Option<Digest>> = names.collect();
         let array = arrays::level_names(after.len())?;
-        let own = arrays::axis(description.quantity, steps.len() as u64)?;
+        let own = arrays::axis(description.is_sum(), steps.len() as u64)?;
         let in_chunk = axis::chunk_steps(&array)?;
         let of_chunk = |chunk: usize| {
             let places = chunk * in_chunk..names.len().min((chunk + 1) * in_chunk);
@@ -180,7 +175,7 @@ impl Levels {
         };
         let steps = steps.len();
         for level in level::levels(&description.grid) {
-            let copies = arrays::level_axis(&level, description.quantity, steps as u64)?;
+            let copies = arrays::level_axis(&level, description.is_sum(), steps as u64)?;
             for (from, to) in [&own.time, &own.bounds].into_iter().zip(copies) {
                 describe(store, &to).await?;
                 refer(session, from, &to, first_step..steps).await?;
@@ -200,7 +195,7 @@ impl Levels {
         for level in level::levels(&description.grid) {
             all.extend(arrays::level_axis(
                 &level,
-                description.quantity,
+                description.is_sum(),
                 before as u64,
             )?);
         }

@@ -17,7 +17,7 @@ use object_store::ObjectStore as _;
 use object_store::path::Path;
 use serde::Serialize;
 
-use crate::store::Leftover;
+use crate::store::{Leftover, PROBES};
 use crate::{StorageError, Store};
 
 pub use owner::{Kept, LEAST_AGE, Owner};
@@ -67,6 +67,37 @@ impl GcPlan {
     /// Number of all that would be removed.
     pub fn count(&self) -> usize {
         self.garbage.len() + self.leftovers.len()
+    }
+
+    /// Looks at all objects of a folder: which are older than an instant, ms, and in nobody's use.
+    async fn look_through(
+        &mut self,
+        store: &Store,
+        (folder, oldest_ms): (&str, i64),
+        in_use: &InUse<'_>,
+    ) -> Result<(), StorageError> {
+        let mut found = store.object_store().list(Some(&Path::from(folder)));
+        let failed = |source| StorageError::Object {
+            key: folder.to_owned(),
+            source,
+        };
+        let mut garbage = vec![];
+        while let Some(meta) = found.try_next().await.map_err(failed)? {
+            // Names that are no keys of ours are not ours to remove.
+            let Ok(key) = meta.location.as_ref().parse::<ObjectKey>() else {
+                continue;
+            };
+            let is_young = meta.last_modified.timestamp_millis() >= oldest_ms;
+            if is_young || in_use.holds(&key) {
+                self.kept_count += 1;
+            } else {
+                let size_bytes = meta.size;
+                garbage.push(Garbage { key, size_bytes });
+            }
+        }
+        garbage.sort_by(|a, b| a.key.cmp(&b.key));
+        self.garbage.extend(garbage);
+        Ok(())
     }
 }
 
@@ -118,30 +149,14 @@ pub async fn plan(
     // Lists come first: nobody may find a version whose parts are gone.
     kinds.sort_by_key(|(kind, _)| (!LISTS.contains(kind), *kind));
     for (kind, least_age) in kinds {
-        let folder = kind.folder();
         let oldest_ms = now.ms() - keep.age.max(least_age).as_millis() as i64;
-        let mut found = store.object_store().list(Some(&Path::from(folder)));
-        let failed = |source| StorageError::Object {
-            key: folder.to_owned(),
-            source,
-        };
-        let mut garbage = vec![];
-        while let Some(meta) = found.try_next().await.map_err(failed)? {
-            // Names that are no keys of ours are not ours to remove.
-            let Ok(key) = meta.location.as_ref().parse::<ObjectKey>() else {
-                continue;
-            };
-            let is_young = meta.last_modified.timestamp_millis() >= oldest_ms;
-            if is_young || in_use.holds(&key) {
-                plan.kept_count += 1;
-            } else {
-                let size_bytes = meta.size;
-                garbage.push(Garbage { key, size_bytes });
-            }
-        }
-        garbage.sort_by(|a, b| a.key.cmp(&b.key));
-        plan.garbage.extend(garbage);
+        plan.look_through(store, (kind.folder(), oldest_ms), &in_use)
+            .await?;
     }
+    // Of services whose keys may remove nothing.
+    let oldest_ms = now.ms() - LEAST_AGE.as_millis() as i64;
+    plan.look_through(store, (PROBES, oldest_ms), &in_use)
+        .await?;
     plan.leftovers = store.leftovers(keep.age.max(LEAST_AGE)).await?;
     Ok(plan)
 }
@@ -197,5 +212,34 @@ pub async fn run(
             reason: "a new version came to use it while it was removed; ingest or derive it again"
                 .to_owned(),
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[tokio::test]
+    async fn probes_that_services_left_go_an_hour_later() {
+        let store = Store::memory();
+        let key: ObjectKey = "probe/1-2".parse().unwrap();
+        store.put_new(&key, "x".into()).await.unwrap();
+        let keep = Keep {
+            versions: 1,
+            age: Duration::from_hours(720),
+        };
+        let now_ms = std::time::SystemTime::now()
+            .duration_since(std::time::UNIX_EPOCH)
+            .unwrap()
+            .as_millis() as i64;
+        let in_hours = |hours: i64| TimeMs::new(now_ms + hours * 3_600_000).unwrap();
+        let young = plan(&store, &[&Versions], keep, in_hours(0)).await.unwrap();
+        assert_eq!((young.garbage.len(), young.kept_count), (0, 1));
+        let old = plan(&store, &[&Versions], keep, in_hours(2)).await.unwrap();
+        assert_eq!(old.garbage[0].key, key);
+        run(&store, &[&Versions], &old, keep, &|_done| ())
+            .await
+            .unwrap();
+        assert!(store.list("").await.unwrap().is_empty());
     }
 }

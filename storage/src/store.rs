@@ -45,6 +45,7 @@ use self::newest::Newest;
 use self::shared_parts::SharedParts;
 use crate::StorageError;
 
+pub(crate) use self::check::PROBES;
 pub use self::leftovers::Leftover;
 pub use self::settings::{RetryLimits, Settings};
 pub use self::swap::Seen;

@@ -1,17 +1,21 @@
 //! What is kept of a cube, and what is found wrong with one.
 
 use std::collections::BTreeSet;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
 use contract::key::ObjectKey;
 use contract::time::TimeMs;
 use cube::{At, Repository, clean_up, follow, verify};
+use futures::FutureExt as _;
 use storage::gc::Keep;
 use storage::verify::Fault;
 use storage::{Store, manifests};
 
 use crate::follow::{holds, version};
 use crate::product::{grid, stores};
+use crate::watched::{broken, watched};
 
 /// A product of three versions, the last without the first's step, and its cube.
 async fn three_versions(store: &Store) -> Vec<contract::manifest::Manifest> {
@@ -51,6 +55,9 @@ async fn versions_that_are_not_kept_go_with_what_they_alone_need_and_the_others_
         let looked = clean_up::run(&store, keep(1), in_hours(2), true).await;
         assert_eq!(looked.unwrap()[0].versions, ["1"]);
         assert_eq!(keys(&store).await, all);
+        // Its manifest has gone before.
+        let first = ObjectKey::manifest(&"p".parse().unwrap(), 1);
+        store.remove(&first).await.unwrap();
         let cleaned = clean_up::run(&store, keep(1), in_hours(2), false).await;
         let cleaned = cleaned.unwrap().remove(0);
         assert_eq!(cleaned.versions, ["1"]);
@@ -99,6 +106,8 @@ async fn what_a_step_held_that_was_dropped_goes_with_the_last_version_that_has_i
         follow(&store, &manifest).await.unwrap();
     }
     let before = chunks().await;
+    let first = ObjectKey::manifest(&"p".parse().unwrap(), 1);
+    store.remove(&first).await.unwrap();
     let keep = Keep {
         versions: 1,
         age: Duration::ZERO,
@@ -107,6 +116,56 @@ async fn what_a_step_held_that_was_dropped_goes_with_the_last_version_that_has_i
         .await
         .unwrap();
     assert_eq!(before - chunks().await, 3);
+}
+
+/// As in a copy of a store, all of whose objects are young while the states of its cubes tell when they were made.
+#[tokio::test]
+async fn a_version_whose_manifest_stays_keeps_its_name_however_old_its_state_is() {
+    let store = Store::memory();
+    let versions = three_versions(&store).await;
+    let keep = Keep {
+        versions: 1,
+        age: Duration::ZERO,
+    };
+    let cleaned = clean_up::run(&store, keep, in_hours(2), false).await;
+    assert!(cleaned.unwrap()[0].versions.is_empty());
+    for (manifest, steps) in versions.iter().zip([&[(1, 1)][..], &[(1, 10), (2, 2)]]) {
+        let tag = At::Version(manifest.number.to_string());
+        holds(&store, tag, manifest, steps).await;
+    }
+}
+
+#[tokio::test]
+async fn a_cube_that_cannot_be_read_is_told_and_the_others_are_cleaned() {
+    let store = Store::memory();
+    let versions = three_versions(&store).await;
+    for (name, key) in [("broken", "repo"), ("begun", "chunks/0123")] {
+        let manifest = contract::manifest::Manifest {
+            product: name.parse().unwrap(),
+            ..versions[0].clone()
+        };
+        manifests::commit(&store, &manifest).await.unwrap();
+        let key = format!("cubes/{name}/{key}").parse().unwrap();
+        store.put_new(&key, "no cube".into()).await.unwrap();
+    }
+    let first = ObjectKey::manifest(&"p".parse().unwrap(), 1);
+    store.remove(&first).await.unwrap();
+    let keep = Keep {
+        versions: 1,
+        age: Duration::ZERO,
+    };
+    let cleaned = clean_up::run(&store, keep, in_hours(2), false).await;
+    let cleaned = cleaned.unwrap();
+    let [broken, whole] = &cleaned[..] else {
+        panic!("{cleaned:?}");
+    };
+    let reason = broken.refused.as_deref().unwrap();
+    assert!(
+        broken.product.as_str() == "broken" && reason.contains("cubes/broken"),
+        "{reason}"
+    );
+    assert_eq!((whole.product.as_str(), &whole.refused), ("p", &None));
+    assert_eq!(whole.versions, ["1"]);
 }
 
 #[tokio::test]
@@ -192,4 +251,82 @@ async fn a_cube_that_is_behind_is_told_and_brought_up() {
     assert!(finding.reason.contains("p@4-"), "{}", finding.reason);
     assert!(!verify::mend(&store, &product).await.unwrap());
     holds(&store, At::Newest, &next, &[(1, 10)]).await;
+}
+
+#[tokio::test]
+async fn a_cube_that_is_made_again_is_found_damaged_until_all_of_it_is_gone() {
+    let inner = Store::memory();
+    three_versions(&inner).await;
+    let all = keys(&inner).await;
+    let chunk = inner.list("cubes/p/chunks").await.unwrap().remove(0);
+    inner.remove(&chunk).await.unwrap();
+    let (store, removed) = watched(&inner, |_key| async { Ok(()) }.boxed());
+    assert!(verify::mend(&store, &"p".parse().unwrap()).await.unwrap());
+    let removed = removed.lock().unwrap();
+    assert_eq!(removed.len(), all.len() - 1);
+    assert_eq!(removed.last().unwrap(), "cubes/p/repo");
+}
+
+#[tokio::test]
+async fn a_store_that_fails_at_any_request_is_no_reason_to_make_a_sound_cube_again() {
+    let inner = Store::memory();
+    three_versions(&inner).await;
+    let (product, all) = ("p".parse().unwrap(), keys(&inner).await);
+    let mut failures = 0;
+    for nth in 0.. {
+        let count = Arc::<AtomicUsize>::default();
+        let counted = Arc::clone(&count);
+        let (store, removed) = watched(&inner, move |key| {
+            let is_of_cube = key.starts_with("cubes/p/");
+            let is_it = is_of_cube && counted.fetch_add(1, Ordering::SeqCst) == nth;
+            async move { if is_it { Err(broken()) } else { Ok(()) } }.boxed()
+        });
+        let mended = verify::mend(&store, &product).await;
+        assert!(removed.lock().unwrap().is_empty(), "request {nth}");
+        assert_eq!(keys(&inner).await, all, "request {nth}");
+        match mended {
+            Ok(is_made) => assert!(!is_made, "request {nth}"),
+            Err(error) => {
+                assert!(error.is_retryable(), "request {nth}: {error}");
+                failures += 1;
+            }
+        }
+        if count.load(Ordering::SeqCst) <= nth {
+            break;
+        }
+    }
+    assert!(failures > all.len(), "{failures}");
+}
+
+#[tokio::test]
+async fn a_cube_that_others_bring_to_a_newer_version_meanwhile_is_left_as_it_is() {
+    let product = "p".parse().unwrap();
+    for nth in 0.. {
+        let inner = Store::memory();
+        three_versions(&inner).await;
+        let count = Arc::<AtomicUsize>::default();
+        let (counted, others) = (Arc::clone(&count), inner.clone());
+        let (store, removed) = watched(&inner, move |_key| {
+            let is_it = counted.fetch_add(1, Ordering::SeqCst) == nth;
+            let others = others.clone();
+            async move {
+                if is_it {
+                    let next = version(&others, grid(40, 60), 4, &[(1, 10), (4, 4)]).await;
+                    manifests::commit(&others, &next).await.unwrap();
+                    follow(&others, &next).await.unwrap();
+                }
+                Ok(())
+            }
+            .boxed()
+        });
+        let mended = verify::mend(&store, &product).await;
+        assert!(removed.lock().unwrap().is_empty(), "request {nth}");
+        assert!(!mended.unwrap(), "request {nth}");
+        if count.load(Ordering::SeqCst) <= nth {
+            break;
+        }
+        let newest = manifests::latest(&inner, &product).await.unwrap().unwrap();
+        assert_eq!(newest.number, 4, "request {nth}");
+        holds(&inner, At::Newest, &newest, &[(1, 10), (4, 4)]).await;
+    }
 }

@@ -10,8 +10,12 @@ use super::{Place, Store, failed, folder, path};
 use crate::StorageError;
 use crate::error::may_pass;
 
+/// Folder of probes.
+pub(crate) const PROBES: &str = "probe";
+
 impl Store {
-    /// Writes a probe, reads it back, tries to create it a second time, which must be refused, and removes it.
+    /// Writes a probe, reads it back, tries to create it a second time, which must be refused, and removes it where that is allowed: to work
+    /// with a store nothing has to be removed, and what is left of probes is for clean-up.
     ///
     /// # Errors
     /// `Location` with what to change: no such bucket, no permission, wrong credentials, or a server that does not
@@ -21,14 +25,10 @@ impl Store {
         let key = probe_key();
         let content = Bytes::from(key.as_str().to_owned());
         let checked = self.probe(&key, &content).await;
-        // Whatever was found, nothing of ours stays; the finding is what counts.
-        match (checked, self.remove(&key).await) {
-            (Err(found), _) => Err(found),
-            (Ok(()), Err(StorageError::Object { source, .. })) if !may_pass(&source) => {
-                Err(self.unusable(format!("objects cannot be removed: {source}")))
-            }
-            (Ok(()), removed) => removed,
+        if let Err(error) = self.remove(&key).await {
+            tracing::debug!(%key, %error, "a probe stays until somebody cleans up");
         }
+        checked
     }
 
     async fn probe(&self, key: &ObjectKey, content: &Bytes) -> Result<(), StorageError> {
@@ -116,7 +116,7 @@ fn probe_key() -> ObjectKey {
     let now = SystemTime::now()
         .duration_since(UNIX_EPOCH)
         .unwrap_or_default();
-    let text = format!("probe/{}-{}", std::process::id(), now.as_nanos());
+    let text = format!("{PROBES}/{}-{}", std::process::id(), now.as_nanos());
     text.parse().expect("digits and a dash are allowed in keys")
 }
 

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 
 use async_trait::async_trait;
-use futures::stream::BoxStream;
+use futures::stream::{BoxStream, StreamExt as _};
 use object_store::memory::InMemory;
 use object_store::path::Path;
 use object_store::{
@@ -33,6 +33,8 @@ pub(super) struct Faulty {
     pub(super) gets: Mutex<VecDeque<Fault>>,
     /// Befalls every put after the list.
     pub(super) always: Mutex<Option<Fault>>,
+    /// What every removal ends with, and nothing is removed.
+    pub(super) removals: Option<fn() -> Error>,
     /// Conditional creation replaces what is there.
     pub(super) overwrites: bool,
     pub(super) put_count: AtomicUsize,
@@ -149,7 +151,10 @@ impl ObjectStore for Faulty {
         &self,
         locations: BoxStream<'static, Result<Path>>,
     ) -> BoxStream<'static, Result<Path>> {
-        self.inner.delete_stream(locations)
+        match self.removals {
+            None => self.inner.delete_stream(locations),
+            Some(error) => locations.map(move |_location| Err(error())).boxed(),
+        }
     }
 
     fn list(&self, prefix: Option<&Path>) -> BoxStream<'static, Result<ObjectMeta>> {

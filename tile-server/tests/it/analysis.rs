@@ -120,27 +120,9 @@ async fn two_series_and_bands_are_asked_for_with_what_belongs_to_them() {
 }
 
 #[tokio::test]
-async fn what_cannot_be_asked_is_refused_with_what_can() {
+async fn what_would_change_nothing_is_refused() {
     let app = TestApp::new().await;
     for (path, reason) in [
-        ("analysis?region=global", "give one of climatology"),
-        ("analysis?region=global&parts=median", "median"),
-        ("analysis?parts=trend", "a region, a line, or lon and lat"),
-        (
-            "analysis?parts=trend&region=global&lon=1&lat=1",
-            "one of them alone",
-        ),
-        (
-            "analysis?parts=trend&region=global&line=0,0;1,1",
-            "one of them alone",
-        ),
-        ("difference?line=0,0;1,1&lon=1&lat=1", "one of them alone"),
-        ("analysis?parts=trend&line=5,5", "two different places"),
-        ("correlation?with=flux&line=0,0;180,0", "opposite"),
-        (
-            "analysis?parts=trend&lon=1",
-            "a region, a line, or lon and lat",
-        ),
         (
             "analysis?parts=trend&region=global&base=1991/2020",
             "belongs to the climatology",
@@ -168,6 +150,41 @@ async fn what_cannot_be_asked_is_refused_with_what_can() {
         (
             "correlation?with=flux&lon=1&lat=1&earth=wgs84",
             "a cell is taken as it is",
+        ),
+    ] {
+        check_refused(&app, path, reason).await;
+    }
+}
+
+/// A question of a product is answered with why it cannot be asked.
+async fn check_refused(app: &TestApp, path: &str, reason: &str) {
+    let refused = app.get(&format!("/api/products/sst/{path}")).await;
+    assert_eq!(refused.status, StatusCode::BAD_REQUEST, "{path}");
+    let text = refused.text();
+    assert!(text.contains(reason), "{path}: {text}");
+}
+
+#[tokio::test]
+async fn what_cannot_be_asked_is_refused_with_what_can() {
+    let app = TestApp::new().await;
+    for (path, reason) in [
+        ("analysis?region=global", "give one of climatology"),
+        ("analysis?region=global&parts=median", "median"),
+        ("analysis?parts=trend", "a region, a line, or lon and lat"),
+        (
+            "analysis?parts=trend&region=global&lon=1&lat=1",
+            "one of them alone",
+        ),
+        (
+            "analysis?parts=trend&region=global&line=0,0;1,1",
+            "one of them alone",
+        ),
+        ("difference?line=0,0;1,1&lon=1&lat=1", "one of them alone"),
+        ("analysis?parts=trend&line=5,5", "two different places"),
+        ("correlation?with=flux&line=0,0;180,0", "opposite"),
+        (
+            "analysis?parts=trend&lon=1",
+            "a region, a line, or lon and lat",
         ),
         (
             "analysis?parts=climatology&region=global&base=2020/1991",
@@ -200,13 +217,7 @@ async fn what_cannot_be_asked_is_refused_with_what_can() {
         ),
         ("difference?region=global&min_coverage=-1", "0 to 100"),
     ] {
-        let refused = app.get(&format!("/api/products/sst/{path}")).await;
-        assert_eq!(refused.status, StatusCode::BAD_REQUEST, "{path}");
-        assert!(
-            refused.text().contains(reason),
-            "{path}: {}",
-            refused.text()
-        );
+        check_refused(&app, path, reason).await;
     }
     let unknown = app
         .get("/api/products/sst/correlation?region=global&with=nothing")

@@ -1,6 +1,7 @@
 //! Every question finds what it names, in one order, page by page.
 
 use contract::observation::{Observation, PlatformKind, Quality};
+use contract::product::ProductId;
 use contract::region::{Polygon, Region};
 use observations::{ErrorClass, Filter, TrackQuery};
 
@@ -291,7 +292,7 @@ pub(crate) async fn every_dataset_is_named_however_many_platforms_others_have(ho
     }
     store.upsert(&rows).await.unwrap();
     let found = store.datasets().await.unwrap();
-    let names: Vec<_> = found.iter().map(|name| name.as_str()).collect();
+    let names: Vec<_> = found.iter().map(ProductId::as_str).collect();
     assert_eq!(names, ["a-first", "buoys", "ships", "z-last"]);
 }
 

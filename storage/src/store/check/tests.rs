@@ -27,6 +27,23 @@ async fn a_good_store_passes_and_keeps_nothing_of_the_probe() {
     }
 }
 
+/// Keys without that right are what services should have; some stores refuse it with an answer that could be any failure.
+#[tokio::test]
+async fn a_store_where_nothing_may_be_removed_can_be_worked_with() {
+    for refusal in [denied as fn() -> _, broken] {
+        let faulty = Arc::new(Faulty {
+            removals: Some(refusal),
+            ..Faulty::default()
+        });
+        let store = store(faulty);
+        store.check_writable().await.unwrap();
+        store.check_writable().await.unwrap();
+        let left = store.list("").await.unwrap();
+        assert!(left.iter().all(|key| key.is_in(PROBES)), "{left:?}");
+        assert_eq!(left.len(), 2);
+    }
+}
+
 #[tokio::test]
 async fn a_store_that_creates_twice_is_refused() {
     let faulty = Arc::new(Faulty {
