@@ -50,7 +50,9 @@ async fn list(settings: &Settings, asked: &ObservationsAsked) -> Result<()> {
         if !found.is_complete {
             progress::say(&cut_list(filter.limit));
         }
-        warnings.iter().for_each(|line| progress::say(line));
+        for line in &warnings {
+            progress::say(line);
+        }
     };
     if asked.json {
         for platform in &platforms {
