@@ -364,7 +364,9 @@ impl<'a> Shift<'a> {
                                 *newest = manifest.number.max(*newest);
                             }
                             Outcome::AlreadyLanded { .. } | Outcome::Superseded { .. } => {
-                                claim.into_iter().for_each(|claim| self.claim(claim));
+                                if let Some(claim) = claim {
+                                    self.claim(claim);
+                                }
                             }
                             Outcome::Rejected { .. } | Outcome::Observed { .. } => {}
                         }
