@@ -236,11 +236,7 @@ fn chunk_index<S: ?Sized>(array: &Array<S>, chunk: u64) -> Vec<u64> {
 }
 
 fn unread<S: ?Sized>(array: &Array<S>, chunk: u64, reason: String) -> CubeError {
-    CubeError::Chunk {
-        array: arrays::name(array),
-        chunk: chunk_index(array, chunk),
-        reason,
-    }
+    CubeError::chunk(arrays::name(array), chunk_index(array, chunk), reason)
 }
 
 /// Reads a chunk along time as a whole, for then its checksum is compared; none if the array has none there.
@@ -265,11 +261,7 @@ where
 {
     let path = definition.path().as_str();
     let opened = Array::async_open(Arc::clone(store), path).await;
-    let array = opened.map_err(|e| CubeError::Foreign {
-        place: place.to_owned(),
-        array: arrays::name(definition),
-        reason: first_lines(&e),
-    })?;
+    let array = opened.map_err(|e| CubeError::foreign(place, arrays::name(definition), e))?;
     arrays::check(&array, definition, place)?;
     Ok(array)
 }

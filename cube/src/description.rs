@@ -13,7 +13,6 @@ use zarrs::group::Group;
 use zarrs::storage::AsyncReadableStorageTraits;
 
 use crate::CubeError;
-use crate::error::first_lines;
 
 /// Version of the layout of cubes, as it is written and read.
 const SCHEMA: u32 = 1;
@@ -94,11 +93,7 @@ impl Description {
         S: AsyncReadableStorageTraits + 'static,
     {
         let group = Group::async_open(Arc::clone(store), "/").await;
-        let group = group.map_err(|e| CubeError::Foreign {
-            place: place.to_owned(),
-            array: "the group".to_owned(),
-            reason: first_lines(&e),
-        })?;
+        let group = group.map_err(|e| CubeError::foreign(place, "the group".to_owned(), e))?;
         Self::read(group.attributes(), place)
     }
 

@@ -3,12 +3,19 @@
 use contract::time::Period;
 use storage::StorageError;
 
+/// What the text of a failure of the store begins with that may pass: the libraries of repositories and of arrays hand failures on as text,
+/// in which it cannot be told otherwise.
+pub(crate) const MAY_PASS: &str = "the store fails at the moment";
+
 /// A cube that cannot be read or written.
 #[derive(Debug, thiserror::Error)]
 pub enum CubeError {
     /// The store refused or lost a request.
     #[error(transparent)]
     Storage(#[from] StorageError),
+    /// The same, behind the libraries of repositories and of arrays, where it may pass.
+    #[error("{what}: {reason}; try again")]
+    Away { what: String, reason: String },
     /// Something is where a new cube was to be.
     #[error("{place} is not empty: give another place, or remove what is there")]
     Exists { place: String },
@@ -88,7 +95,7 @@ impl CubeError {
     pub fn is_retryable(&self) -> bool {
         match self {
             Self::Storage(error) => error.is_retryable(),
-            Self::Contended { .. } => true,
+            Self::Away { .. } | Self::Contended { .. } => true,
             Self::Exists { .. }
             | Self::Missing { .. }
             | Self::NoVersion { .. }
@@ -103,17 +110,48 @@ impl CubeError {
         }
     }
 
-    /// A failure of the libraries, without the trace of spans that Icechunk's errors carry behind their first lines.
+    /// A failure of the libraries, without the trace of spans that Icechunk's errors carry behind their first lines; of the store behind them, if
+    /// that is what failed and may pass. So are the next two.
     pub(crate) fn library(
         place: &str,
         doing: &'static str,
         reason: impl std::fmt::Display,
     ) -> Self {
-        Self::Library {
+        let reason = first_lines(&reason);
+        Self::away(&reason, || format!("{place}: {doing}")).unwrap_or_else(|| Self::Library {
             place: place.to_owned(),
             doing,
-            reason: first_lines(&reason),
-        }
+            reason,
+        })
+    }
+
+    /// A chunk that cannot be read.
+    pub(crate) fn chunk(array: String, chunk: Vec<u64>, reason: String) -> Self {
+        let away = Self::away(&reason, || format!("chunk {chunk:?} of {array}"));
+        away.unwrap_or(Self::Chunk {
+            array,
+            chunk,
+            reason,
+        })
+    }
+
+    /// What a library does not take for what this crate writes.
+    pub(crate) fn foreign(place: &str, array: String, reason: impl std::fmt::Display) -> Self {
+        let reason = first_lines(&reason);
+        let away = Self::away(&reason, || format!("{array} in {place}"));
+        away.unwrap_or_else(|| Self::Foreign {
+            place: place.to_owned(),
+            array,
+            reason,
+        })
+    }
+
+    /// A failure of the store that may pass, if a library tells of one.
+    fn away(reason: &str, what: impl FnOnce() -> String) -> Option<Self> {
+        reason.contains(MAY_PASS).then(|| Self::Away {
+            what: what(),
+            reason: reason.to_owned(),
+        })
     }
 }
 
@@ -122,4 +160,33 @@ pub(crate) fn first_lines(error: &dyn std::fmt::Display) -> String {
     let text = error.to_string();
     let end = text.find("\n\ncontext:").unwrap_or(text.len());
     text[..end].trim().to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_the_store_fails_at_may_pass_however_it_is_handed_on_and_the_rest_stays() {
+        let all = |reason: &str| {
+            [
+                CubeError::library("s3://b/p", "reading a key", reason),
+                CubeError::chunk("sst".to_owned(), vec![1, 0, 0], reason.to_owned()),
+                CubeError::foreign("s3://b/p", "the group".to_owned(), reason),
+            ]
+        };
+        for error in all(&format!(
+            "storage error: {MAY_PASS}: 503\n\ncontext:\n 0: x"
+        )) {
+            let text = error.to_string();
+            assert!(error.is_retryable(), "{text}");
+            assert!(
+                text.contains("503") && !text.contains("land the file"),
+                "{text}"
+            );
+        }
+        for error in all("the checksum differs") {
+            assert!(!error.is_retryable(), "{error}");
+        }
+    }
 }

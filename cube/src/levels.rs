@@ -16,7 +16,6 @@ use zarrs::storage::AsyncReadableStorageTraits;
 use zarrs_icechunk::AsyncIcechunkStore;
 
 use crate::arrays::{self, Definition, LEVELS};
-use crate::error::first_lines;
 use crate::joining::Method;
 use crate::rounding::KEPT_BITS;
 use crate::{CubeError, Description, Step, axis, cf, group, names, plain};
@@ -65,11 +64,7 @@ impl Levels {
             Err(e) => return Err(CubeError::library(place, "looking for levels", e)),
         }
         let group = Group::async_open(Arc::clone(store), &format!("/{LEVELS}")).await;
-        let group = group.map_err(|e| CubeError::Foreign {
-            place: place.to_owned(),
-            array: LEVELS.to_owned(),
-            reason: first_lines(&e),
-        })?;
+        let group = group.map_err(|e| CubeError::foreign(place, LEVELS.to_owned(), e))?;
         if group.attributes().get(ATTRIBUTE) != Some(&written(description)) {
             return Ok(Self {
                 is_foreign: true,

@@ -25,11 +25,9 @@ where
     for chunk in 0..count.div_ceil(DIGEST_CHUNK) {
         let index = [chunk, 0];
         let found = array.async_retrieve_chunk_if_exists::<Vec<u8>>(&index);
-        let found = found.await.map_err(|e| CubeError::Chunk {
-            array: arrays::name(&array),
-            chunk: index.to_vec(),
-            reason: first_lines(&e),
-        })?;
+        let found = found
+            .await
+            .map_err(|e| CubeError::chunk(arrays::name(&array), index.to_vec(), first_lines(&e)))?;
         // One of zeros alone is not stored.
         bytes.extend(found.unwrap_or_else(|| vec![0; chunk_bytes]));
     }

@@ -31,6 +31,8 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use storage::store::Seen;
 use storage::{Store, sound};
 
+use crate::error::MAY_PASS;
+
 type Pieces = Pin<Box<dyn Stream<Item = Result<Bytes, StorageError>> + Send>>;
 
 /// A folder of a store as a place for a repository.
@@ -76,7 +78,7 @@ impl ObjectStorage {
     ) -> Result<Vec<Bytes>, String> {
         let path = Path::from(self.path(&format!("chunks/{chunk}")));
         let found = self.store.shared_parts(&path, ranges).await;
-        found.map_err(|e| e.to_string())
+        found.map_err(|source| told(&of_object(&path, source)))
     }
 
     async fn read_changing(&self, name: &str) -> StorageResult<(Bytes, VersionInfo)> {
@@ -105,6 +107,7 @@ impl ObjectStorage {
         };
         let path = Path::from(self.path(name));
         let found = self.store.object_store().get_opts(&path, options).await;
+        let answered = |e| answered(&path, e);
         let found = found.map_err(answered)?;
         let version = VersionInfo {
             etag: found.meta.e_tag.clone().map(ETag),
@@ -172,14 +175,27 @@ fn failed(error: &storage::StorageError) -> StorageError {
     if error.is_not_found() {
         not_found()
     } else {
-        other(error)
+        other(&told(error))
     }
 }
 
-fn answered(error: object_store::Error) -> StorageError {
-    match error {
-        object_store::Error::NotFound { .. } => not_found(),
-        error => StorageError::capture(StorageErrorKind::ObjectStore(Box::new(error))),
+fn answered(path: &Path, error: object_store::Error) -> StorageError {
+    failed(&of_object(path, error))
+}
+
+fn of_object(path: &Path, source: object_store::Error) -> storage::StorageError {
+    storage::StorageError::Object {
+        key: path.to_string(),
+        source,
+    }
+}
+
+/// What libraries hand on of a failure of the store: nobody can ask it any more whether it may pass.
+fn told(error: &storage::StorageError) -> String {
+    if error.is_retryable() {
+        format!("{MAY_PASS}: {error}")
+    } else {
+        error.to_string()
     }
 }
 
@@ -299,7 +315,9 @@ impl Storage for ObjectStorage {
     ) -> StorageResult<BoxStream<'a, StorageResult<ListInfo<String>>>> {
         let folder = Path::from(self.path(prefix));
         let found = self.store.object_store().list(Some(&folder));
-        let listed = found.map_err(answered).try_filter_map(move |meta| {
+        let asked = folder.clone();
+        let found = found.map_err(move |e| answered(&asked, e));
+        let listed = found.try_filter_map(move |meta| {
             let name = meta.location.as_ref();
             let name = name.strip_prefix(folder.as_ref()).unwrap_or(name);
             let id = name.trim_start_matches('/').to_owned();
@@ -337,7 +355,8 @@ impl Storage for ObjectStorage {
     ) -> StorageResult<DateTime<Utc>> {
         let path = Path::from(self.path(path));
         let meta = self.store.object_store().head(&path).await;
-        Ok(meta.map_err(answered)?.last_modified)
+        let meta = meta.map_err(|e| answered(&path, e))?;
+        Ok(meta.last_modified)
     }
 
     async fn get_object_conditional(

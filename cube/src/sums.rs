@@ -99,11 +99,7 @@ impl Sums {
             ..Self::default()
         };
         let group = Group::async_open(Arc::clone(arrays), &format!("/{SUMS}")).await;
-        let group = group.map_err(|e| CubeError::Foreign {
-            place: place.to_owned(),
-            array: SUMS.to_owned(),
-            reason: first_lines(&e),
-        })?;
+        let group = group.map_err(|e| CubeError::foreign(place, SUMS.to_owned(), e))?;
         let written = group.attributes().get(ATTRIBUTE);
         let scale = written.filter(|own| own["layout"] == LAYOUT);
         let scale = scale.and_then(|own| serde_json::from_value(own["scale"].clone()).ok());
@@ -112,11 +108,7 @@ impl Sums {
         };
         let array = axis::open(arrays, &arrays::row_weights(&description.grid)?, place).await?;
         let weights = array.async_retrieve_chunk_if_exists::<Vec<i64>>(&[0]).await;
-        let damaged = |reason: String| CubeError::Chunk {
-            array: arrays::name(&array),
-            chunk: vec![0],
-            reason,
-        };
+        let damaged = |reason: String| CubeError::chunk(arrays::name(&array), vec![0], reason);
         let row_weights = weights.map_err(|e| damaged(first_lines(&e)))?;
         let row_weights = row_weights.ok_or_else(|| damaged("it is not there".to_owned()))?;
         Ok(Self {

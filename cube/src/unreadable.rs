@@ -23,11 +23,7 @@ impl Object<'_> {
             Some(name) => format!("{reason} (in {name})"),
             None => reason.to_owned(),
         };
-        CubeError::Chunk {
-            array: arrays::name(self.array),
-            chunk: chunk.to_vec(),
-            reason,
-        }
+        CubeError::chunk(arrays::name(self.array), chunk.to_vec(), reason)
     }
 
     /// None if it cannot be told, or the chunk lies in what names it.

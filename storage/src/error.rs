@@ -101,8 +101,8 @@ fn of_object(key: &str, source: &object_store::Error) -> String {
 /// May the same request to an object store succeed later?
 ///
 /// Clients put whatever they do not tell apart into one kind, `Generic`: there the cause decides. A full disk may be
-/// emptied and a server may come back; a request that a server finds wrong (400 to 499), or a folder that may not be
-/// written, stays as it is.
+/// emptied and a server may come back; a request that a server finds wrong (400 to 499), a part behind the end of an object, or a
+/// folder that may not be written, stays as it is.
 pub(crate) fn may_pass(error: &object_store::Error) -> bool {
     use object_store::Error;
     match error {
@@ -123,6 +123,12 @@ fn is_final(cause: &(dyn std::error::Error + 'static)) -> bool {
     use std::io::ErrorKind;
     // Requests that were too slow, too many, or in each other's way.
     const PASSING: [&str; 3] = ["408", "409", "429"];
+    // An object that is shorter than whoever asks for a part of it was told: in memory, and twice of a folder.
+    const SHORT: [&str; 3] = [
+        "Wanted range starting at",
+        "Requested range was invalid",
+        "Out of range of file",
+    ];
     if let Some(failure) = cause.downcast_ref::<Failure>() {
         return !failure.is_retryable();
     }
@@ -131,6 +137,9 @@ fn is_final(cause: &(dyn std::error::Error + 'static)) -> bool {
         && status.starts_with('4')
     {
         return !PASSING.iter().any(|passing| status.starts_with(passing));
+    }
+    if SHORT.iter().any(|short| text.contains(short)) {
+        return true;
     }
     std::iter::successors(Some(cause), |cause| cause.source())
         .filter_map(|cause| cause.downcast_ref::<std::io::Error>())
@@ -147,7 +156,12 @@ fn is_final(cause: &(dyn std::error::Error + 'static)) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use object_store::local::LocalFileSystem;
+    use object_store::memory::InMemory;
+    use object_store::path::Path;
+    use object_store::{ObjectStore, ObjectStoreExt as _};
     use std::io::{Error as IoError, ErrorKind};
+    use std::sync::Arc;
 
     fn generic(source: impl Into<Box<dyn std::error::Error + Send + Sync>>) -> object_store::Error {
         object_store::Error::Generic {
@@ -168,6 +182,19 @@ mod tests {
         assert!(!may_pass(&generic(IoError::from(
             ErrorKind::ReadOnlyFilesystem
         ))));
+    }
+
+    #[tokio::test]
+    async fn a_part_behind_the_end_of_an_object_is_not_there_later_either() {
+        let folder = tempfile::tempdir().unwrap();
+        let local = LocalFileSystem::new_with_prefix(folder.path()).unwrap();
+        let stores: [Arc<dyn ObjectStore>; 2] = [Arc::new(InMemory::new()), Arc::new(local)];
+        for store in stores {
+            let path = Path::from("a");
+            store.put(&path, "abc".into()).await.unwrap();
+            let error = store.get_range(&path, 5..9).await.unwrap_err();
+            assert!(!may_pass(&error), "{error}");
+        }
     }
 
     #[test]

@@ -117,6 +117,9 @@ impl Cubes {
 fn failed(error: CubeError) -> ServerError {
     match error {
         CubeError::Storage(error) => error.into(),
+        error if error.is_retryable() => ServerError::CubeAway {
+            what: error.to_string(),
+        },
         error => ServerError::Defect {
             what: error.to_string(),
         },

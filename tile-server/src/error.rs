@@ -27,6 +27,9 @@ pub(crate) struct Refusal {
     error: String,
 }
 
+/// What users are told of a store that may answer later.
+const AWAY: &str = "the store does not answer at the moment";
+
 /// Most names that a refusal lists.
 const NAMES: usize = 20;
 
@@ -140,6 +143,9 @@ pub enum ServerError {
     /// The store does not answer, and what is in memory is not enough.
     #[error("the store does not answer, and without it no picture was drawn within {limit_s} s")]
     StoreAway { limit_s: u64 },
+    /// The store failed while a cube was read, and may answer later.
+    #[error("{what}")]
+    CubeAway { what: String },
     /// The store failed.
     #[error(transparent)]
     Storage(Arc<StorageError>),
@@ -193,7 +199,8 @@ impl ServerError {
             | Self::TooManyListeners
             | Self::TooManyStreams
             | Self::Stopping
-            | Self::StoreAway { .. } => StatusCode::SERVICE_UNAVAILABLE,
+            | Self::StoreAway { .. }
+            | Self::CubeAway { .. } => StatusCode::SERVICE_UNAVAILABLE,
             Self::NoWebSocket { .. } => StatusCode::UPGRADE_REQUIRED,
             Self::TimedOut { .. } => StatusCode::GATEWAY_TIMEOUT,
             Self::Storage(error) if error.is_retryable() => StatusCode::SERVICE_UNAVAILABLE,
@@ -230,9 +237,8 @@ impl ServerError {
     /// The text for users: never that of a low-level error.
     pub(crate) fn text(&self) -> String {
         match self {
-            Self::Storage(error) if error.is_retryable() => {
-                "the store does not answer at the moment".to_owned()
-            }
+            Self::Storage(error) if error.is_retryable() => AWAY.to_owned(),
+            Self::CubeAway { .. } => AWAY.to_owned(),
             _ if self.status() == StatusCode::INTERNAL_SERVER_ERROR => {
                 "something went wrong on our side; the server's log says more".to_owned()
             }

@@ -53,7 +53,11 @@ pub(crate) async fn run(settings: &Settings, options: &Migrate) -> Result<ExitCo
         let outcome = match Box::pin(migrate(&store, &product, &told)).await {
             Ok(migrated) => (Some(migrated), None),
             // It says nothing of this product alone.
-            Err(CubeError::Storage(error)) if error.is_retryable() => return Err(error.into()),
+            Err(error @ (CubeError::Storage(_) | CubeError::Away { .. }))
+                if error.is_retryable() =>
+            {
+                return Err(error.into());
+            }
             Err(error) => (None, Some(error.to_string())),
         };
         let (migrated, refused) = outcome;

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use axum::Router;
 use axum::body::Bytes;
@@ -11,19 +11,23 @@ use axum::extract::{Path, Query, State};
 use axum::http::{HeaderMap, Method, StatusCode, header};
 use axum::response::{IntoResponse as _, Response};
 use axum::routing::any;
+use contract::digest::Digest;
 use contract::quantity::Quantity;
+use contract::time::TimeMs;
 use storage::Store;
 use storage::store::{RetryLimits, Settings};
 
 use crate::app::TestApp;
 
-/// As much of S3 as this server uses: objects are put, read and listed.
+/// As much of S3 as this server uses: objects are put, replaced by who knows them, read in parts and listed.
 #[derive(Default)]
 struct Bucket {
     objects: Mutex<BTreeMap<String, Bytes>>,
     /// Requests are taken and never answered.
     is_silent: AtomicBool,
     unanswered: AtomicUsize,
+    /// Requests for what belongs to a cube are answered, and fail.
+    cubes_fail: AtomicBool,
     /// Method and key of every request.
     requests: Mutex<Vec<(Method, String)>>,
 }
@@ -33,6 +37,7 @@ async fn object(
     path: Option<Path<String>>,
     Query(query): Query<BTreeMap<String, String>>,
     method: Method,
+    asked: HeaderMap,
     content: Bytes,
 ) -> Response {
     if bucket.is_silent.load(Ordering::SeqCst) {
@@ -42,32 +47,63 @@ async fn object(
     let key = path.map(|Path(key)| key).unwrap_or_default();
     let request = (method.clone(), key.clone());
     bucket.requests.lock().unwrap().push(request);
+    if bucket.cubes_fail.load(Ordering::SeqCst) && key.starts_with("cubes/") {
+        return StatusCode::INTERNAL_SERVER_ERROR.into_response();
+    }
     if key.is_empty() {
         let prefix = query.get("prefix").map_or("", String::as_str);
         return listing(&bucket, prefix, query.contains_key("delimiter"));
     }
     let mut objects = bucket.objects.lock().unwrap();
-    let dated = |length: usize| {
+    let dated = |content: &Bytes| {
         let mut headers = HeaderMap::new();
-        let date = "Sat, 01 Jan 2000 00:00:00 GMT";
-        headers.insert(header::LAST_MODIFIED, date.parse().unwrap());
-        headers.insert(header::ETAG, format!("\"{length}\"").parse().unwrap());
+        headers.insert(header::LAST_MODIFIED, date().parse().unwrap());
+        let tag = format!("\"{}\"", Digest::of(content));
+        headers.insert(header::ETAG, tag.parse().unwrap());
         headers
     };
     match method {
-        Method::PUT if objects.contains_key(&key) => {
+        Method::PUT if objects.contains_key(&key) && !asked.contains_key(header::IF_MATCH) => {
             StatusCode::PRECONDITION_FAILED.into_response()
         }
         Method::PUT => {
-            let headers = dated(content.len());
+            let headers = dated(&content);
             objects.insert(key, content);
             headers.into_response()
         }
-        _ => match objects.get(&key).cloned() {
-            Some(content) => (dated(content.len()), content).into_response(),
-            None => StatusCode::NOT_FOUND.into_response(),
+        _ => match (objects.get(&key).cloned(), part_of(&asked)) {
+            (Some(content), None) => (dated(&content), content).into_response(),
+            (Some(content), Some((first, last))) => {
+                let length = content.len();
+                let (first, end) = (first.min(length), (last + 1).min(length));
+                let part = content.slice(first..end);
+                let mut headers = dated(&content);
+                let place = format!("bytes {first}-{}/{length}", end - 1);
+                headers.insert(header::CONTENT_RANGE, place.parse().unwrap());
+                (StatusCode::PARTIAL_CONTENT, headers, part).into_response()
+            }
+            (None, _) => StatusCode::NOT_FOUND.into_response(),
         },
     }
+}
+
+/// Now, as servers say it: whoever commits to a cube compares it with its own clock.
+fn date() -> String {
+    const MONTHS: [&str; 12] = [
+        "Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", "Nov", "Dec",
+    ];
+    let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap();
+    let now = TimeMs::new(since.as_millis() as i64).unwrap().to_string();
+    let (year, month, day, time) = (&now[..4], &now[5..7], &now[8..10], &now[11..19]);
+    let month = MONTHS[month.parse::<usize>().unwrap() - 1];
+    format!("{day} {month} {year} {time} GMT")
+}
+
+/// The first and the last byte that are asked for.
+fn part_of(asked: &HeaderMap) -> Option<(usize, usize)> {
+    let range = asked.get(header::RANGE)?.to_str().unwrap();
+    let (first, last) = range.strip_prefix("bytes=")?.split_once('-')?;
+    Some((first.parse().unwrap(), last.parse().unwrap()))
 }
 
 fn listing(bucket: &Bucket, prefix: &str, is_of_folders: bool) -> Response {
@@ -199,4 +235,25 @@ async fn a_picture_that_was_never_drawn_is_one_look_up_and_one_write() {
     let other = "/tiles/flux/map/1/0/0.png";
     assert_eq!(app.get(other).await.status, StatusCode::OK);
     assert_eq!(of_pictures()[2..], [Method::GET], "who draws is who writes");
+}
+
+#[tokio::test]
+async fn a_store_that_fails_while_a_cube_is_read_is_away_and_no_fault_of_ours() {
+    let (bucket, store) = remote().await;
+    let app = TestApp::over(store, |_settings| {});
+    app.land("flux", Quantity::CarbonFlux, 1).await;
+    let (group, chunk) = ("/zarr/flux@1/zarr.json", "/zarr/flux@1/carbon_flux/c/0/0/0");
+    // While it is opened, and when it is open.
+    for path in [group, chunk] {
+        bucket.cubes_fail.store(true, Ordering::SeqCst);
+        let failed = app.get(path).await;
+        assert_eq!(failed.status, StatusCode::SERVICE_UNAVAILABLE, "{path}");
+        assert!(!failed.header("retry-after").is_empty(), "{path}");
+        assert!(failed.reason().contains("store"), "{}", failed.reason());
+        bucket.cubes_fail.store(false, Ordering::SeqCst);
+        let answer = app.get(path).await;
+        assert_eq!(answer.status, StatusCode::OK, "{path}: {}", answer.text());
+        // It is forgotten with a failure, and has to be open for the next.
+        assert_eq!(app.get(group).await.status, StatusCode::OK);
+    }
 }
