@@ -7,6 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use contract::key::ObjectKey;
 use contract::kind::Kind;
+use contract::manifest::Manifest;
 use contract::product::ProductId;
 use futures::TryStreamExt as _;
 use futures::future::BoxFuture;
@@ -65,6 +66,8 @@ pub fn check<'a>(
         let mut checked = Checked::default();
         match check.versions(product, &mut checked).await {
             Ok(()) => {}
+            // It says nothing of the cube.
+            Err(error) if error.is_retryable() => return Err(error),
             // What it needs is damaged, and told of already.
             Err(error) if check.is_damaged => {
                 tracing::debug!(%error, "what is left of a cube cannot be read");
@@ -93,6 +96,7 @@ struct Check<'a> {
     folder: String,
     /// The object that all is found by.
     entry: ObjectKey,
+    /// What was there when it began.
     there: BTreeSet<ObjectKey>,
     damaged: &'a BTreeSet<ObjectKey>,
     /// Is one of these of this cube?
@@ -106,6 +110,11 @@ impl Check<'_> {
             fault: Fault::Damaged,
             reason: error.to_string(),
         }
+    }
+
+    /// Is an object not there? Whoever publishes meanwhile adds some.
+    async fn is_gone(&self, key: &ObjectKey) -> Result<bool, CubeError> {
+        Ok(!self.there.contains(key) && !self.store.exists(key).await?)
     }
 
     async fn versions(&self, product: &ProductId, checked: &mut Checked) -> Result<(), CubeError> {
@@ -158,8 +167,9 @@ impl Check<'_> {
             let key = format!("{}/manifests/{}", self.folder, file.id);
             let key: ObjectKey = key.parse().map_err(|e| named(&self.folder, &e))?;
             let is_told = checked.findings.iter().any(|finding| finding.key == key);
-            has_all &= self.there.contains(&key);
-            if !self.there.contains(&key) && !is_told {
+            let is_gone = self.is_gone(&key).await?;
+            has_all &= !is_gone;
+            if is_gone && !is_told {
                 checked.findings.push(Finding {
                     key,
                     fault: Fault::Missing,
@@ -256,7 +266,7 @@ impl Check<'_> {
             let key: ObjectKey = key.parse().map_err(|e| named(&self.folder, &e))?;
             let (array, index) = (path.to_string(), &chunk.coord.0);
             let array = array.trim_start_matches('/');
-            let is_gone = !self.there.contains(&key);
+            let is_gone = self.is_gone(&key).await?;
             if !is_gone && !self.damaged.contains(&key) {
                 continue;
             }
@@ -282,8 +292,11 @@ impl Check<'_> {
 /// Brings the cube of a product to its newest version, whatever became of it: one that is damaged is made again from the
 /// versions that are there. True if it was made again.
 ///
+/// One that others bring to a newer version meanwhile is left as it is.
+///
 /// # Errors
-/// The store does not answer; a field that the cube is made of is damaged or gone.
+/// The store does not answer: a sound cube is as it was, another one is made by the next call. A field that the cube is made of is damaged or
+/// gone.
 pub fn mend<'a>(
     store: &'a Store,
     product: &'a ProductId,
@@ -298,7 +311,6 @@ pub fn mend<'a>(
             let mut faults = checked.findings.iter().map(|finding| finding.fault);
             is_whole = faults.all(|fault| fault == Fault::Behind);
         }
-        let versions = manifests::numbers(store, product).await?;
         let Some(newest) = manifests::latest(store, product).await? else {
             return Ok(false);
         };
@@ -306,21 +318,13 @@ pub fn mend<'a>(
         if store.attached_to(&newest).await?.is_some() {
             return Ok(false);
         }
-        // Of a newer version than there is: somebody took the newest manifest away.
-        if is_whole
-            && let Ok(followed) = crate::follow(store, &newest).await
-            && followed.version == newest.id()
-        {
+        if is_whole && follows(store, &newest).await? {
             compact::compact(store, &folder).await?;
             return Ok(false);
         }
-        // What says where all else is goes last: until then others find a damaged cube, and none that they may add to.
-        let entry = format!("{folder}/repo");
-        let (last, first): (Vec<_>, Vec<_>) = keys.iter().partition(|key| key.is_in(&entry));
-        for key in first.into_iter().chain(last) {
-            store.remove(key).await?;
-        }
-        for number in versions {
+        remove(store, keys, &folder).await?;
+        // Asked for now: others may have published meanwhile, and their version was in the cube that is gone.
+        for number in manifests::numbers(store, product).await? {
             if let Some(manifest) = manifests::numbered(store, product, number).await? {
                 crate::follow(store, &manifest).await?;
             }
@@ -328,4 +332,41 @@ pub fn mend<'a>(
         compact::compact(store, &folder).await?;
         Ok(true)
     })
+}
+
+/// Brings a sound cube to the newest version of its product; false if it is of one that is no more, or cannot be brought there.
+///
+/// # Errors
+/// What says nothing of the cube: a store that does not answer, a field that is damaged or gone.
+async fn follows(store: &Store, newest: &Manifest) -> Result<bool, CubeError> {
+    let followed = match crate::follow(store, newest).await {
+        Ok(followed) => followed.version,
+        // Nor would what is made again: the store fails, or what the newest version is made of is damaged.
+        Err(error) if error.is_retryable() || matches!(error, CubeError::Storage(_)) => {
+            return Err(error);
+        }
+        Err(error) => {
+            tracing::warn!(%error, "a cube cannot follow, and is made again");
+            return Ok(false);
+        }
+    };
+    if followed == newest.id() {
+        return Ok(true);
+    }
+    // Of a newer version: others have published meanwhile, or somebody took the newest manifest away.
+    let there = manifests::numbered(store, &followed.product, followed.number).await?;
+    Ok(there.is_some_and(|there| there.id() == followed))
+}
+
+/// Removes the objects of a cube. What says where all else is goes last: until then others find a damaged cube, and none that they may add to.
+async fn remove(store: &Store, keys: Vec<ObjectKey>, folder: &str) -> Result<(), CubeError> {
+    let entry = format!("{folder}/repo");
+    // A Hadoop file system has it in a folder beside it.
+    let is_entry =
+        |key: &ObjectKey| key.as_str() == entry || key.is_in(&format!("{entry}.numbers"));
+    let (last, first): (Vec<_>, Vec<_>) = keys.into_iter().partition(is_entry);
+    for key in first.iter().chain(&last) {
+        store.remove(key).await?;
+    }
+    Ok(())
 }

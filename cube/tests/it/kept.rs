@@ -1,17 +1,21 @@
 //! What is kept of a cube, and what is found wrong with one.
 
 use std::collections::BTreeSet;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
 use contract::key::ObjectKey;
 use contract::time::TimeMs;
 use cube::{At, Repository, clean_up, follow, verify};
+use futures::FutureExt as _;
 use storage::gc::Keep;
 use storage::verify::Fault;
 use storage::{Store, manifests};
 
 use crate::follow::{holds, version};
 use crate::product::{grid, stores};
+use crate::watched::{broken, watched};
 
 /// A product of three versions, the last without the first's step, and its cube.
 async fn three_versions(store: &Store) -> Vec<contract::manifest::Manifest> {
@@ -192,4 +196,82 @@ async fn a_cube_that_is_behind_is_told_and_brought_up() {
     assert!(finding.reason.contains("p@4-"), "{}", finding.reason);
     assert!(!verify::mend(&store, &product).await.unwrap());
     holds(&store, At::Newest, &next, &[(1, 10)]).await;
+}
+
+#[tokio::test]
+async fn a_cube_that_is_made_again_is_found_damaged_until_all_of_it_is_gone() {
+    let inner = Store::memory();
+    three_versions(&inner).await;
+    let all = keys(&inner).await;
+    let chunk = inner.list("cubes/p/chunks").await.unwrap().remove(0);
+    inner.remove(&chunk).await.unwrap();
+    let (store, removed) = watched(&inner, |_key| async { Ok(()) }.boxed());
+    assert!(verify::mend(&store, &"p".parse().unwrap()).await.unwrap());
+    let removed = removed.lock().unwrap();
+    assert_eq!(removed.len(), all.len() - 1);
+    assert_eq!(removed.last().unwrap(), "cubes/p/repo");
+}
+
+#[tokio::test]
+async fn a_store_that_fails_at_any_request_is_no_reason_to_make_a_sound_cube_again() {
+    let inner = Store::memory();
+    three_versions(&inner).await;
+    let (product, all) = ("p".parse().unwrap(), keys(&inner).await);
+    let mut failures = 0;
+    for nth in 0.. {
+        let count = Arc::<AtomicUsize>::default();
+        let counted = Arc::clone(&count);
+        let (store, removed) = watched(&inner, move |key| {
+            let is_of_cube = key.starts_with("cubes/p/");
+            let is_it = is_of_cube && counted.fetch_add(1, Ordering::SeqCst) == nth;
+            async move { if is_it { Err(broken()) } else { Ok(()) } }.boxed()
+        });
+        let mended = verify::mend(&store, &product).await;
+        assert!(removed.lock().unwrap().is_empty(), "request {nth}");
+        assert_eq!(keys(&inner).await, all, "request {nth}");
+        match mended {
+            Ok(is_made) => assert!(!is_made, "request {nth}"),
+            Err(error) => {
+                assert!(error.is_retryable(), "request {nth}: {error}");
+                failures += 1;
+            }
+        }
+        if count.load(Ordering::SeqCst) <= nth {
+            break;
+        }
+    }
+    assert!(failures > all.len(), "{failures}");
+}
+
+#[tokio::test]
+async fn a_cube_that_others_bring_to_a_newer_version_meanwhile_is_left_as_it_is() {
+    let product = "p".parse().unwrap();
+    for nth in 0.. {
+        let inner = Store::memory();
+        three_versions(&inner).await;
+        let count = Arc::<AtomicUsize>::default();
+        let (counted, others) = (Arc::clone(&count), inner.clone());
+        let (store, removed) = watched(&inner, move |_key| {
+            let is_it = counted.fetch_add(1, Ordering::SeqCst) == nth;
+            let others = others.clone();
+            async move {
+                if is_it {
+                    let next = version(&others, grid(40, 60), 4, &[(1, 10), (4, 4)]).await;
+                    manifests::commit(&others, &next).await.unwrap();
+                    follow(&others, &next).await.unwrap();
+                }
+                Ok(())
+            }
+            .boxed()
+        });
+        let mended = verify::mend(&store, &product).await;
+        assert!(removed.lock().unwrap().is_empty(), "request {nth}");
+        assert!(!mended.unwrap(), "request {nth}");
+        if count.load(Ordering::SeqCst) <= nth {
+            break;
+        }
+        let newest = manifests::latest(&inner, &product).await.unwrap().unwrap();
+        assert_eq!(newest.number, 4, "request {nth}");
+        holds(&inner, At::Newest, &newest, &[(1, 10), (4, 4)]).await;
+    }
 }

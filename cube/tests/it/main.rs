@@ -14,4 +14,5 @@ mod product;
 mod rivals;
 mod round_trip;
 mod series;
+mod watched;
 mod windows;
