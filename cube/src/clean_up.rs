@@ -13,8 +13,8 @@ use futures::future::BoxFuture;
 use icechunk::format::SnapshotId;
 use icechunk::ops::gc::{ExpiredRefAction, GCConfig, expire, garbage_collect};
 use serde::Serialize;
-use storage::Store;
 use storage::gc::{Keep, Kept, LEAST_AGE};
+use storage::{Store, manifests};
 
 use crate::{CubeError, Repository, folder, verify};
 
@@ -38,9 +38,21 @@ pub struct Cleaned {
     pub objects_count: u64,
     /// Their size.
     pub size_bytes: u64,
+    /// Why the cube could not be cleaned, and was left as it is.
+    pub refused: Option<String>,
 }
 
 impl Cleaned {
+    fn nothing(product: ProductId) -> Self {
+        Self {
+            product,
+            versions: vec![],
+            objects_count: 0,
+            size_bytes: 0,
+            refused: None,
+        }
+    }
+
     /// Was there anything to do?
     pub fn is_nothing(&self) -> bool {
         self.versions.is_empty() && self.objects_count == 0
@@ -48,12 +60,13 @@ impl Cleaned {
 }
 
 /// Cleans all cubes of a store: versions whose manifests are not kept and that are old enough go, and objects that are old
-/// enough and that no kept version needs. With `is_dry_run` nothing is changed.
+/// enough and that no kept version needs. With `is_dry_run` nothing is changed. A cube that cannot be read is left as it is, and the others are
+/// cleaned.
 ///
 /// Who lands meanwhile is in no danger: what is young stays, and the newest state with it.
 ///
 /// # Errors
-/// A store that does not answer; a cube that cannot be read, of which nothing is removed.
+/// A store that does not answer.
 pub fn run(
     store: &Store,
     keep: Keep,
@@ -61,45 +74,82 @@ pub fn run(
     is_dry_run: bool,
 ) -> BoxFuture<'_, Result<Vec<Cleaned>, CubeError>> {
     Box::pin(async move {
-        let kept = Kept::read(store, keep.versions.max(1)).await?;
-        let age = keep.age.max(LEAST_AGE);
+        let cleaning = Cleaning {
+            store,
+            kept: Kept::read(store, keep.versions.max(1)).await?,
+            older_than: older_than(now, keep.age.max(LEAST_AGE))?,
+            is_dry_run,
+        };
         let mut all = vec![];
         for product in verify::products(store).await? {
-            let numbers: BTreeSet<String> = kept
-                .manifests
-                .iter()
-                .filter(|manifest| manifest.product == product)
-                .map(|manifest| manifest.number.to_string())
-                .collect();
-            // A product that is there no more: somebody removed it by hand, and decides about its cube, too.
-            if numbers.is_empty() {
-                continue;
+            match cleaning.clean(&product).await {
+                Ok(cleaned) => all.extend(cleaned),
+                // What is left of one, or the beginning of one.
+                Err(CubeError::Missing { .. }) => {}
+                Err(error) if error.is_retryable() => return Err(error),
+                Err(error) => {
+                    tracing::warn!(%product, %error, "a cube is left as it is");
+                    all.push(Cleaned {
+                        refused: Some(error.to_string()),
+                        ..Cleaned::nothing(product)
+                    });
+                }
             }
-            let repository = Repository::open(store, &folder(&product)).await?;
-            let cutoff = older_than(now, age, &repository)?;
-            let versions = repository.cut_names(&numbers, cutoff, is_dry_run).await?;
-            let (objects_count, size_bytes) =
-                Box::pin(repository.remove_unused(cutoff, is_dry_run)).await?;
-            all.push(Cleaned {
-                product,
-                versions,
-                objects_count,
-                size_bytes,
-            });
         }
         Ok(all)
     })
 }
 
-fn older_than(
-    now: TimeMs,
-    age: Duration,
-    repository: &Repository,
-) -> Result<DateTime<Utc>, CubeError> {
+fn older_than(now: TimeMs, age: Duration) -> Result<DateTime<Utc>, CubeError> {
     let now = DateTime::from_timestamp_millis(now.ms());
     let cutoff = now.zip(TimeDelta::from_std(age).ok());
     let cutoff = cutoff.and_then(|(now, age)| now.checked_sub_signed(age));
-    cutoff.ok_or_else(|| repository.failed("cleaning up", &"its age is out of range"))
+    cutoff.ok_or_else(|| CubeError::library("cubes", "cleaning up", "the age is out of range"))
+}
+
+/// What is kept of all cubes.
+struct Cleaning<'a> {
+    store: &'a Store,
+    kept: Kept,
+    older_than: DateTime<Utc>,
+    is_dry_run: bool,
+}
+
+impl Cleaning<'_> {
+    /// Cleans the cube of a product; none of a product that is there no more: somebody removed it by hand, and decides about its cube, too.
+    async fn clean(&self, product: &ProductId) -> Result<Option<Cleaned>, CubeError> {
+        let numbers = self.numbers(product).await?;
+        if numbers.is_empty() {
+            return Ok(None);
+        }
+        let (older_than, is_dry_run) = (self.older_than, self.is_dry_run);
+        let repository = Repository::open(self.store, &folder(product)).await?;
+        let versions = repository
+            .cut_names(&numbers, older_than, is_dry_run)
+            .await?;
+        let (objects_count, size_bytes) =
+            Box::pin(repository.remove_unused(older_than, is_dry_run)).await?;
+        Ok(Some(Cleaned {
+            versions,
+            objects_count,
+            size_bytes,
+            ..Cleaned::nothing(product.clone())
+        }))
+    }
+
+    /// Versions that keep their names: those that are kept, and all others whose manifests stay, of whatever age their states are. In a store that
+    /// was copied every object is young, and states tell when they were made.
+    async fn numbers(&self, product: &ProductId) -> Result<BTreeSet<String>, CubeError> {
+        let own = self.kept.manifests.iter();
+        let own = own.filter(|manifest| manifest.product == *product);
+        let mut numbers: BTreeSet<u64> = own.map(|manifest| manifest.number).collect();
+        // Where nothing is changed, those are there that would have gone before.
+        let oldest_ms = self.older_than.timestamp_millis();
+        let there = manifests::published(self.store, product).await?.into_iter();
+        let stay = there.filter(|(_, written)| !self.is_dry_run || written.ms() >= oldest_ms);
+        numbers.extend(stay.map(|(number, _)| number));
+        Ok(numbers.iter().map(ToString::to_string).collect())
+    }
 }
 
 impl Repository {

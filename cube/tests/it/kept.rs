@@ -55,6 +55,9 @@ async fn versions_that_are_not_kept_go_with_what_they_alone_need_and_the_others_
         let looked = clean_up::run(&store, keep(1), in_hours(2), true).await;
         assert_eq!(looked.unwrap()[0].versions, ["1"]);
         assert_eq!(keys(&store).await, all);
+        // Its manifest has gone before.
+        let first = ObjectKey::manifest(&"p".parse().unwrap(), 1);
+        store.remove(&first).await.unwrap();
         let cleaned = clean_up::run(&store, keep(1), in_hours(2), false).await;
         let cleaned = cleaned.unwrap().remove(0);
         assert_eq!(cleaned.versions, ["1"]);
@@ -103,6 +106,8 @@ async fn what_a_step_held_that_was_dropped_goes_with_the_last_version_that_has_i
         follow(&store, &manifest).await.unwrap();
     }
     let before = chunks().await;
+    let first = ObjectKey::manifest(&"p".parse().unwrap(), 1);
+    store.remove(&first).await.unwrap();
     let keep = Keep {
         versions: 1,
         age: Duration::ZERO,
@@ -111,6 +116,56 @@ async fn what_a_step_held_that_was_dropped_goes_with_the_last_version_that_has_i
         .await
         .unwrap();
     assert_eq!(before - chunks().await, 3);
+}
+
+/// As in a copy of a store, all of whose objects are young while the states of its cubes tell when they were made.
+#[tokio::test]
+async fn a_version_whose_manifest_stays_keeps_its_name_however_old_its_state_is() {
+    let store = Store::memory();
+    let versions = three_versions(&store).await;
+    let keep = Keep {
+        versions: 1,
+        age: Duration::ZERO,
+    };
+    let cleaned = clean_up::run(&store, keep, in_hours(2), false).await;
+    assert!(cleaned.unwrap()[0].versions.is_empty());
+    for (manifest, steps) in versions.iter().zip([&[(1, 1)][..], &[(1, 10), (2, 2)]]) {
+        let tag = At::Version(manifest.number.to_string());
+        holds(&store, tag, manifest, steps).await;
+    }
+}
+
+#[tokio::test]
+async fn a_cube_that_cannot_be_read_is_told_and_the_others_are_cleaned() {
+    let store = Store::memory();
+    let versions = three_versions(&store).await;
+    for (name, key) in [("broken", "repo"), ("begun", "chunks/0123")] {
+        let manifest = contract::manifest::Manifest {
+            product: name.parse().unwrap(),
+            ..versions[0].clone()
+        };
+        manifests::commit(&store, &manifest).await.unwrap();
+        let key = format!("cubes/{name}/{key}").parse().unwrap();
+        store.put_new(&key, "no cube".into()).await.unwrap();
+    }
+    let first = ObjectKey::manifest(&"p".parse().unwrap(), 1);
+    store.remove(&first).await.unwrap();
+    let keep = Keep {
+        versions: 1,
+        age: Duration::ZERO,
+    };
+    let cleaned = clean_up::run(&store, keep, in_hours(2), false).await;
+    let cleaned = cleaned.unwrap();
+    let [broken, whole] = &cleaned[..] else {
+        panic!("{cleaned:?}");
+    };
+    let reason = broken.refused.as_deref().unwrap();
+    assert!(
+        broken.product.as_str() == "broken" && reason.contains("cubes/broken"),
+        "{reason}"
+    );
+    assert_eq!((whole.product.as_str(), &whole.refused), ("p", &None));
+    assert_eq!(whole.versions, ["1"]);
 }
 
 #[tokio::test]

@@ -3,7 +3,7 @@
 
 use std::time::Duration;
 
-use anyhow::Result;
+use anyhow::{Result, bail};
 use compute::gc::Computed;
 use ingest::{LandingNotes, Readings};
 use observations::Datasets;
@@ -74,7 +74,11 @@ async fn say_attached(store: &Store) -> Result<()> {
 }
 
 /// Cleans cubes, after the manifests that they follow; a line for each that had something to remove.
+///
+/// # Errors
+/// After all others, with those that could not be cleaned.
 async fn cubes(store: &Store, keep: Keep, is_dry_run: bool) -> Result<()> {
+    let mut left = vec![];
     for cleaned in cube::clean_up::run(store, keep, notice::now()?, is_dry_run).await? {
         if !cleaned.is_nothing() {
             progress::result(&format!(
@@ -90,6 +94,15 @@ async fn cubes(store: &Store, keep: Keep, is_dry_run: bool) -> Result<()> {
                 if is_dry_run { " would go" } else { " are gone" }
             ));
         }
+        if let Some(reason) = cleaned.refused {
+            left.push(format!("{}: {reason}", cleaned.product));
+        }
+    }
+    if !left.is_empty() {
+        bail!(
+            "cubes that cannot be read were left as they are; `fluxglobe recompute --product PRODUCT --verify` makes them again: {}",
+            left.join("; ")
+        );
     }
     Ok(())
 }
