@@ -1,13 +1,11 @@
 //! What may be summed over area and time, a flux of carbon and no extreme of one; and what may be averaged, no days of a year that goes round.
 
-use std::collections::BTreeSet;
-
 use contract::ContractError;
 use contract::analysis::MapStatistic;
-use contract::computed::Computation;
 use contract::manifest::Manifest;
 use contract::quantity::Quantity;
 use contract::statistics::Percentile;
+use storage::manifests::OverTime;
 use storage::{Store, manifests};
 
 use crate::ComputeError;
@@ -31,44 +29,14 @@ pub async fn has_budget(store: &Store, manifest: &Manifest) -> Result<bool, Comp
 /// `NotSummed` of the highest or lowest values or a percentile of each cell, and of these on another grid or averaged: cells of which each has
 /// its value from another time were never there together.
 pub(crate) async fn check_summed(store: &Store, manifest: &Manifest) -> Result<(), ComputeError> {
-    let (mut source, mut seen) = (None, BTreeSet::from([manifest.product.clone()]));
-    loop {
-        let own = source.as_ref().unwrap_or(manifest);
-        let Some(computed) = &own.computed else {
-            return Ok(());
-        };
-        let Some(from) = computed.inputs.first().map(|input| &input.manifest) else {
-            return Ok(());
-        };
-        match &computed.how {
-            Computation::Statistic { statistic, .. } if is_extreme(*statistic) => {
-                return Err(ComputeError::NotSummed {
-                    product: manifest.product.clone(),
-                    what: in_words(*statistic),
-                    of: from.product.clone(),
-                });
-            }
-            // What keeps the quantity of what it is made of.
-            Computation::Regrid { .. }
-            | Computation::Statistic {
-                statistic: MapStatistic::Mean | MapStatistic::Climatology,
-                ..
-            } => {
-                let found = match manifests::load(store, from).await {
-                    Ok(found) => Some(found),
-                    // That version is let go; of what kind the product is the newest one says.
-                    Err(error) if error.is_not_found() => {
-                        manifests::latest(store, &from.product).await?
-                    }
-                    Err(error) => return Err(error.into()),
-                };
-                match found {
-                    Some(found) if seen.insert(found.product.clone()) => source = Some(found),
-                    _ => return Ok(()),
-                }
-            }
-            _ => return Ok(()),
-        }
+    let over_time = manifests::over_time(store, manifest).await?;
+    match over_time.filter(OverTime::is_extreme) {
+        Some(OverTime { statistic, of }) => Err(ComputeError::NotSummed {
+            product: manifest.product.clone(),
+            what: in_words(statistic),
+            of,
+        }),
+        None => Ok(()),
     }
 }
 
@@ -88,13 +56,6 @@ pub(crate) fn check_averaged(manifest: &Manifest) -> Result<(), ContractError> {
         manifest.product.as_str(),
         reason,
     ))
-}
-
-fn is_extreme(statistic: MapStatistic) -> bool {
-    matches!(
-        statistic,
-        MapStatistic::Min | MapStatistic::Max | MapStatistic::Percentile(_)
-    )
 }
 
 fn in_words(statistic: MapStatistic) -> String {

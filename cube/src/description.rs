@@ -7,8 +7,10 @@ use contract::grid::Grid;
 use contract::manifest::{Manifest, ManifestId};
 use contract::product::ProductId;
 use contract::quantity::Quantity;
+use futures::future::BoxFuture;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
+use storage::{Store, manifests};
 use zarrs::group::Group;
 use zarrs::storage::AsyncReadableStorageTraits;
 
@@ -37,8 +39,8 @@ pub struct Description {
     pub grid: Grid,
     /// The version that the cube is a copy of, if it is one.
     pub version: Option<ManifestId>,
-    /// What its values are over time of what it was made of; none of a product that is no statistic of another, and in cubes of before it was
-    /// kept.
+    /// What its values are over time of what it was made of, by [`storage::manifests::over_time`]; none of a product that is no statistic of
+    /// another, and in cubes of before it was kept.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub statistic: Option<MapStatistic>,
 }
@@ -47,14 +49,25 @@ impl Description {
     /// The attribute of the group, or of an exported file, that holds it.
     pub const ATTRIBUTE: &'static str = ATTRIBUTE;
 
-    /// The description of a version of a product.
-    pub fn of(manifest: &Manifest) -> Self {
-        Self::named(manifest, manifest.id())
+    /// The description of a version of a product in a store.
+    ///
+    /// # Errors
+    /// A version that it was made of and that cannot be read.
+    pub fn of<'a>(
+        store: &'a Store,
+        manifest: &'a Manifest,
+    ) -> BoxFuture<'a, Result<Self, CubeError>> {
+        Box::pin(async move { Self::named(store, manifest, manifest.id()).await })
     }
 
     /// The same for who knows the version's name, which takes longer to compute the more steps there are.
-    pub(crate) fn named(manifest: &Manifest, version: ManifestId) -> Self {
-        Self {
+    pub(crate) async fn named(
+        store: &Store,
+        manifest: &Manifest,
+        version: ManifestId,
+    ) -> Result<Self, CubeError> {
+        let over_time = manifests::over_time(store, manifest).await?;
+        Ok(Self {
             product: manifest.product.clone(),
             title: manifest.title.clone(),
             quantity: manifest.quantity,

@@ -190,7 +190,8 @@ impl Follower<'_> {
         mut at_hand: Option<&'a dyn AtHand>,
     ) -> BoxFuture<'a, Result<Followed, CubeError>> {
         Box::pin(async move {
-            let description = Description::named(manifest, version.clone());
+            let described = Description::named(self.fields, manifest, version.clone());
+            let description = described.await?;
             let repository = Repository::for_change(self.store, self.folder, &description).await?;
             let mut edit = Edit::describing(&repository, description.clone()).await?;
             let mut handed = Handed::default();
@@ -246,7 +247,7 @@ impl Follower<'_> {
         }
         let version = manifest.id();
         let message = version.to_string();
-        let description = Description::named(manifest, version);
+        let description = Description::named(self.fields, manifest, version).await?;
         let repository = Repository::for_change(self.store, self.folder, &description).await?;
         if repository.has_version(&tag).await? {
             return Ok(followed);

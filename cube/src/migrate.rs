@@ -120,7 +120,7 @@ impl Migration<'_> {
         let repository = Repository::open(self.store, &self.folder).await?;
         let tag = At::Version(manifest.number.to_string());
         let cube = repository.at(&tag).await?;
-        self.describes(&cube, manifest)?;
+        self.describes(&cube, manifest).await?;
         let steps = manifest.steps.iter().enumerate();
         let place = |(place, step): (usize, &Step)| {
             let own = (step.period, step.field.clone(), place);
@@ -145,17 +145,20 @@ impl Migration<'_> {
             // It was published meanwhile, and followed by whoever did that.
             return Ok(());
         }
-        self.describes(&cube, manifest)?;
+        self.describes(&cube, manifest).await?;
         let all: Vec<usize> = (0..manifest.steps.len()).collect();
         self.compare(&cube, manifest, &all).await
     }
 
     /// Is this state that version, with its steps?
-    fn describes(&self, cube: &Cube, manifest: &Manifest) -> Result<(), CubeError> {
+    async fn describes(&self, cube: &Cube, manifest: &Manifest) -> Result<(), CubeError> {
         let found = cube.description();
-        let mut wanted = Description::of(manifest);
-        // Cubes of before say nothing of it.
-        wanted.statistic = found.statistic.and(wanted.statistic);
+        let mut wanted = Description::of(self.store, manifest).await?;
+        let done = manifest.computed.as_ref();
+        // Cubes of before say nothing of it, or what was done last.
+        if found.statistic.is_none() || found.statistic == done.and_then(|it| it.how.statistic()) {
+            wanted.statistic = found.statistic;
+        }
         if *found != wanted {
             let of = |it: &Description| {
                 let version = it.version.as_ref().map(ToString::to_string);

@@ -1,5 +1,6 @@
 //! Numbered manifests: the newest of a product, one by its name, and the commit of the next.
 
+mod over_time;
 mod pages;
 mod published;
 
@@ -15,6 +16,7 @@ use contract::product::ProductId;
 use crate::sound::damage;
 use crate::{StorageError, Store, document, fields};
 
+pub use over_time::{OverTime, over_time};
 pub use published::{AtInstant, as_of, published};
 
 /// Versions that were published since the last look, up to which each is asked for.

@@ -3,7 +3,6 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use contract::manifest::Manifest;
 use cube::{Description, cf};
 use datafusion::arrow::datatypes::{DataType, Field, Schema, SchemaRef, TimeUnit};
 
@@ -43,7 +42,7 @@ impl Column {
         Self::ALL.into_iter().find(|column| column.name() == name)
     }
 
-    fn field(self, manifest: &Manifest) -> Field {
+    fn field(self, description: &Description) -> Field {
         let said = |pairs: &[(&str, &str)]| {
             let pair = |(name, text): &(&str, &str)| ((*name).to_owned(), (*text).to_owned());
             pairs.iter().map(pair).collect::<HashMap<_, _>>()
@@ -64,7 +63,7 @@ impl Column {
             Self::Area => field(DataType::Float64)
                 .with_metadata(said(&[("standard_name", "cell_area"), ("units", "km2")])),
             Self::Value => {
-                let texts = cf::of_values(&Description::of(manifest)).into_iter();
+                let texts = cf::of_values(description).into_iter();
                 let texts = texts
                     .filter_map(|(name, value)| value.as_str().map(|text| (name, text.to_owned())));
                 field(DataType::Float32).with_metadata(texts.collect())
@@ -79,7 +78,7 @@ pub(super) fn instant() -> DataType {
 }
 
 /// The table of a version: values in the stored unit, which their field says as the CF conventions do.
-pub(super) fn schema(manifest: &Manifest) -> SchemaRef {
-    let fields = Column::ALL.map(|column| column.field(manifest));
+pub(super) fn schema(description: &Description) -> SchemaRef {
+    let fields = Column::ALL.map(|column| column.field(description));
     Arc::new(Schema::new(fields.to_vec()))
 }

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use async_trait::async_trait;
+use cube::Description;
 use datafusion::arrow::datatypes::SchemaRef;
 use datafusion::catalog::{Session, TableProvider};
 use datafusion::common::Result;
@@ -23,9 +24,9 @@ pub(super) struct ProductTable {
 }
 
 impl ProductTable {
-    pub(super) fn new(version: Version) -> Self {
+    pub(super) fn new(version: Version, description: &Description) -> Self {
         Self {
-            schema: columns::schema(version.manifest()),
+            schema: columns::schema(description),
             version,
         }
     }

@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use async_trait::async_trait;
 use contract::product::ProductId;
+use cube::Description;
 use datafusion::catalog::{SchemaProvider, TableProvider};
 use datafusion::error::DataFusionError;
 use datafusion::logical_expr::TableType;
@@ -58,14 +59,13 @@ impl Tables {
         let Some(named) = Named::of(name) else {
             return Ok(None);
         };
-        let manifest = named.manifest(&self.engine).await?;
-        if manifest.is_none() {
+        let Some(manifest) = named.manifest(&self.engine).await? else {
             named.check_version(&self.engine).await?;
-        }
-        let table = |manifest| -> Arc<dyn TableProvider> {
-            Arc::new(ProductTable::new(Version::new(&self.engine, manifest)))
+            return Ok(None);
         };
-        Ok(manifest.map(table))
+        let description = Description::of(self.engine.store(), &manifest).await?;
+        let version = Version::new(&self.engine, manifest);
+        Ok(Some(Arc::new(ProductTable::new(version, &description))))
     }
 }
 

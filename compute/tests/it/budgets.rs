@@ -1,15 +1,21 @@
 //! Budgets with known answers, and questions that have none.
 
+use compute::computed::{Request, RequestedInput, compute};
 use compute::derive::derive_statistic;
 use compute::{ComputeError, Engine, ErrorClass, budget, derive_accumulated};
 use contract::analysis::{MapOptions, MapStatistic};
 use contract::budget::BudgetQuery;
+use contract::computed::{Computation, Matching, Regridding};
 use contract::earth::Earth;
 use contract::grid::Grid;
+use contract::product::ProductId;
 use contract::quantity::Quantity;
 use contract::statistics::Percentile;
 use contract::time::{Period, TimeStep};
+use cube::{At, Description, Repository};
+use storage::manifests;
 
+use crate::computed::FOUR_DEGREES;
 use crate::fixture::{
     ONE_DEGREE, ask, folder_store, land, months, parts, product, total, wavy_year,
 };
@@ -285,5 +291,59 @@ async fn extremes_of_a_flux_have_no_budget() {
         assert!(refused.contains(&told), "{refused}");
         let refused = derive_accumulated(&engine, &product, None, &|_| ()).await;
         assert!(refused.unwrap_err().to_string().contains(&told));
+    }
+}
+
+/// Nor where it is brought to another grid or averaged, and its cube says so to whoever reads it elsewhere.
+#[tokio::test(flavor = "multi_thread")]
+async fn an_extreme_of_a_flux_is_one_on_another_grid_and_averaged() {
+    let (_folder, store) = folder_store();
+    let (id, year) = (product("wavy"), wavy_year(&ONE_DEGREE));
+    land(&store, &id, Quantity::CarbonFlux, ONE_DEGREE, &year).await;
+    let engine = Engine::local(store.clone());
+    let made = async |source: ProductId, statistic: MapStatistic, name: &'static str| {
+        let options = MapOptions {
+            name: Some(product(name)),
+            ..MapOptions::new(statistic)
+        };
+        let made = derive_statistic(&engine, &source, &options, &|_| ()).await;
+        made.unwrap().product
+    };
+    let highest = made(id, MapStatistic::Max, "highest").await;
+    let averaged = made(highest.clone(), MapStatistic::Mean, "averaged").await;
+    let request = Request {
+        target: product("coarse"),
+        title: None,
+        quantity: None,
+        how: Computation::Regrid {
+            method: Regridding::Conservative,
+            min_coverage: 0.0,
+        },
+        grid: Some(FOUR_DEGREES),
+        inputs: vec![RequestedInput {
+            name: "source".into(),
+            product: averaged.clone(),
+            matching: Matching::SamePeriod,
+        }],
+        from: None,
+        to: None,
+    };
+    compute(&engine, &request, &|_| ()).await.unwrap();
+    for product in [highest, averaged, product("coarse")] {
+        let newest = manifests::latest(&store, &product).await.unwrap().unwrap();
+        assert_eq!(newest.quantity, Quantity::CarbonFlux);
+        let described = Description::of(&store, &newest).await.unwrap();
+        let folder = cube::folder(&product);
+        let repository = Repository::open(&store, &folder).await.unwrap();
+        let cube = repository.at(&At::Newest).await.unwrap();
+        for description in [&described, cube.description()] {
+            assert_eq!(description.statistic, Some(MapStatistic::Max), "{product}");
+        }
+        let refused = budget(&engine, &total(&product, "global")).await;
+        let refused = refused.unwrap_err().to_string();
+        assert!(
+            refused.contains("holds the highest values of each cell of wavy"),
+            "{refused}"
+        );
     }
 }

@@ -117,7 +117,7 @@ enum Arriving {
 /// Writes files on a thread for what blocks, while what comes next is read.
 async fn files(source: Source<'_>, format: Format, path: &Path) -> Result<()> {
     let manifest = source.manifest;
-    let description = Description::of(manifest);
+    let description = Description::of(source.store, manifest).await?;
     let periods: Vec<Period> = manifest.steps.iter().map(|step| step.period).collect();
     let mut written = export::create(format, path, &description, &periods)?;
     let (sender, mut arriving) = mpsc::channel(1);
@@ -184,7 +184,7 @@ async fn arrays(
 ) -> Result<Option<String>> {
     let (store, manifest, bar) = (source.store, source.manifest, source.bar);
     if to == ExportFormat::Zarr {
-        let description = Description::of(manifest);
+        let description = Description::of(store, manifest).await?;
         let mut zarr = PlainZarr::create(destination, "", &description).await?;
         let cube = own_cube(store, manifest).await;
         for (place, step) in manifest.steps.iter().enumerate() {
