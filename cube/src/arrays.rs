@@ -4,7 +4,6 @@ use std::sync::Arc;
 
 use contract::grid::Grid;
 use contract::level::Level;
-use contract::quantity::Quantity;
 use serde_json::{Map, Value, json};
 use zarrs::array::codec::{BytesCodec, Crc32cCodec, ZstdCodec};
 use zarrs::array::data_type::{float32, float64, int32, int64, uint8};
@@ -25,6 +24,8 @@ pub(crate) const SERIES_OF_BEFORE: &str = "series";
 pub(crate) const SUMS: &str = "sums";
 /// Group of coarser levels.
 pub(crate) const LEVELS: &str = "levels";
+/// Name of the array of the starts of steps, where the bounds are those of sums.
+pub(crate) const STEP_START: &str = "step_start";
 /// Steps in a chunk of the time coordinate.
 pub(crate) const TIME_CHUNK: u64 = 1024;
 /// Steps in a chunk of digests, which do not compress.
@@ -242,21 +243,21 @@ impl Axis {
 }
 
 /// The arrays along time for a number of steps.
-pub(crate) fn axis(quantity: Quantity, steps: u64) -> Result<Axis, CubeError> {
-    axis_in("", quantity, steps)
+pub(crate) fn axis(is_sum: bool, steps: u64) -> Result<Axis, CubeError> {
+    axis_in("", is_sum, steps)
 }
 
 /// Those that a level has too: where a step's value holds, and its bounds.
 pub(crate) fn level_axis(
     level: &Level,
-    quantity: Quantity,
+    is_sum: bool,
     steps: u64,
 ) -> Result<[Definition; 2], CubeError> {
-    let axis = axis_in(&format!("{}/", level_group(level)), quantity, steps)?;
+    let axis = axis_in(&format!("{}/", level_group(level)), is_sum, steps)?;
     Ok([axis.time, axis.bounds])
 }
 
-fn axis_in(folder: &str, quantity: Quantity, steps: u64) -> Result<Axis, CubeError> {
+fn axis_in(folder: &str, is_sum: bool, steps: u64) -> Result<Axis, CubeError> {
     let instants = |name: &str, attributes| {
         let shape = Shape {
             name: format!("{folder}{name}"),
@@ -281,12 +282,11 @@ fn axis_in(folder: &str, quantity: Quantity, steps: u64) -> Result<Axis, CubeErr
         zstd_level: ZSTD_LEVEL,
         dimensions: &["time", "sha256_byte"],
     };
-    let is_sum = quantity == Quantity::AccumulatedCarbon;
     Ok(Axis {
         time: instants("time", cf::of_time())?,
         bounds: define(&bounds, int64(), 0i64.into(), Map::new(), None)?,
         step_start: is_sum
-            .then(|| instants("step_start", cf::of_step_start()))
+            .then(|| instants(STEP_START, cf::of_step_start()))
             .transpose()?,
         digests: define(&digests, uint8(), 0u8.into(), cf::of_digests(), None)?,
     })

@@ -8,9 +8,9 @@ use contract::time::{Period, TimeMs};
 use futures::FutureExt as _;
 use futures::stream::{self, StreamExt as _, TryStreamExt as _};
 use zarrs::array::{Array, ElementOwned};
-use zarrs::storage::{AsyncReadableStorageTraits, AsyncWritableStorageTraits};
+use zarrs::storage::{AsyncReadableStorageTraits, AsyncWritableStorageTraits, StoreKey};
 
-use crate::arrays::{self, DIGEST_BYTES, Definition};
+use crate::arrays::{self, DIGEST_BYTES, Definition, STEP_START};
 use crate::error::first_lines;
 use crate::{CubeError, Description};
 
@@ -30,10 +30,11 @@ pub struct Step {
 
 impl Step {
     /// The instant where its values hold: the middle of a mean, the end of a sum.
-    fn time(&self, quantity: Quantity) -> TimeMs {
-        match quantity {
-            Quantity::AccumulatedCarbon => self.period.end,
-            _ => self.period.mid(),
+    fn time(&self, is_sum: bool) -> TimeMs {
+        if is_sum {
+            self.period.end
+        } else {
+            self.period.mid()
         }
     }
 }
@@ -48,21 +49,19 @@ pub(crate) async fn write<S>(
 where
     S: AsyncWritableStorageTraits + 'static,
 {
-    let quantity = description.quantity;
-    let axis = arrays::axis(quantity, steps.len() as u64)?;
+    let is_sum = description.is_sum();
+    let axis = arrays::axis(is_sum, steps.len() as u64)?;
+    // A sum is one since the first step, and so are its bounds.
     let origin = steps.first().map(|step| step.period.start);
-    let bounds_start = |step: &Step| match quantity {
-        // A sum is one since the first step, and so are its bounds.
-        Quantity::AccumulatedCarbon => origin.unwrap_or(step.period.start),
-        _ => step.period.start,
-    };
+    let origin = origin.filter(|_| is_sum);
+    let bounds_start = |step: &Step| origin.unwrap_or(step.period.start);
     let writer = Writer {
         store,
         steps,
         first,
     };
     writer
-        .write(&axis.time, |step| [step.time(quantity).ms()])
+        .write(&axis.time, |step| [step.time(is_sum).ms()])
         .await?;
     writer
         .write(&axis.bounds, |step| {
@@ -139,6 +138,23 @@ where
     Ok(())
 }
 
+/// Are the starts of steps there beside their bounds, which are those of a sum? Statistics of sums were written so too, once.
+pub(crate) async fn has_step_start<S>(
+    store: &Arc<S>,
+    description: &Description,
+) -> Result<bool, CubeError>
+where
+    S: AsyncReadableStorageTraits + 'static,
+{
+    if description.is_sum() || description.quantity != Quantity::AccumulatedCarbon {
+        return Ok(description.is_sum());
+    }
+    let failed = |e: &dyn std::fmt::Display| CubeError::library(STEP_START, "looking for it", e);
+    let key = StoreKey::new(format!("{STEP_START}/zarr.json")).map_err(|e| failed(&e))?;
+    let found = store.get(&key).await.map_err(|e| failed(&e))?;
+    Ok(found.is_some())
+}
+
 /// Reads all steps.
 ///
 /// # Errors
@@ -151,7 +167,7 @@ pub(crate) async fn read<S>(
 where
     S: AsyncReadableStorageTraits + 'static,
 {
-    let axis = arrays::axis(description.quantity, 1)?;
+    let axis = arrays::axis(has_step_start(store, description).await?, 1)?;
     let bounds: Vec<i64> = read_array(store, &axis.bounds, place, None).await?;
     let starts: Vec<i64> = match &axis.step_start {
         // Sums may begin with 1970.
@@ -277,6 +293,7 @@ pub(crate) fn chunk_steps(definition: &Definition) -> Result<usize, CubeError> {
 
 #[cfg(test)]
 mod tests {
+    use contract::analysis::MapStatistic;
     use contract::grid::Grid;
     use icechunk::format::{ChunkIndices, Path};
     use storage::Store;
@@ -295,9 +312,8 @@ mod tests {
         dlon_deg: 45.0,
     };
 
-    /// A cube of January 1970.
-    async fn cube(quantity: Quantity) -> Repository {
-        let description = Description {
+    fn description(quantity: Quantity, statistic: Option<MapStatistic>) -> Description {
+        Description {
             product: "p".parse().unwrap(),
             title: "P".to_owned(),
             quantity,
@@ -305,16 +321,97 @@ mod tests {
             source: "a test".to_owned(),
             grid: GRID,
             version: None,
-            statistic: None,
-        };
-        let created = Repository::create(&Store::memory(), "p", &description).await;
+            statistic,
+        }
+    }
+
+    /// A cube of January 1970.
+    async fn cube(quantity: Quantity) -> Repository {
+        cube_of(&Store::memory(), &description(quantity, None), 1).await
+    }
+
+    /// A cube of the first months of 1970.
+    async fn cube_of(store: &Store, description: &Description, months: u32) -> Repository {
+        let created = Repository::create(store, "p", description).await;
         let repository = created.unwrap();
-        let mut edit = Edit::begin(&repository).await.unwrap();
-        let values: Arc<[f32]> = vec![1.0; GRID.cell_count()].into();
-        let january = Period::month(1970, 1).unwrap();
-        edit.put(january, values).await.unwrap();
-        edit.commit("a step").await.unwrap();
+        put(&repository, 1..=months).await;
         repository
+    }
+
+    async fn put(repository: &Repository, months: std::ops::RangeInclusive<u32>) {
+        let mut edit = Edit::begin(repository).await.unwrap();
+        for month in months {
+            let values: Arc<[f32]> = vec![month as f32; GRID.cell_count()].into();
+            let period = Period::month(1970, month).unwrap();
+            edit.put(period, values).await.unwrap();
+        }
+        edit.commit("steps").await.unwrap();
+    }
+
+    /// Instants of an array along time.
+    async fn instants(
+        repository: &Repository,
+        of: impl Fn(&arrays::Axis) -> &Definition,
+    ) -> Vec<i64> {
+        let session = repository.session().await.unwrap();
+        let store = Arc::new(AsyncIcechunkStore::from(session));
+        let axis = arrays::axis(false, 1).unwrap();
+        read_array(&store, of(&axis), "p", None).await.unwrap()
+    }
+
+    /// Middles of months, and where they begin and end.
+    fn of_months(months: std::ops::RangeInclusive<u32>) -> (Vec<i64>, Vec<i64>) {
+        let periods = months.map(|month| Period::month(1970, month).unwrap());
+        let both = periods.map(|own| (own.mid().ms(), [own.start.ms(), own.end.ms()]));
+        let (middles, bounds): (Vec<i64>, Vec<[i64; 2]>) = both.unzip();
+        (middles, bounds.concat())
+    }
+
+    #[tokio::test]
+    async fn a_statistic_of_sums_is_of_its_own_time_and_no_sum_since_the_first_step() {
+        let statistic = Some(MapStatistic::Climatology);
+        let own = description(Quantity::AccumulatedCarbon, statistic);
+        let repository = cube_of(&Store::memory(), &own, 3).await;
+        let (middles, bounds) = of_months(1..=3);
+        assert_eq!(instants(&repository, |axis| &axis.time).await, middles);
+        assert_eq!(instants(&repository, |axis| &axis.bounds).await, bounds);
+        let cube = repository.at(&At::Newest).await.unwrap();
+        let months: Vec<Period> = cube.steps().iter().map(|step| step.period).collect();
+        assert_eq!(
+            months,
+            [1, 2, 3].map(|month| Period::month(1970, month).unwrap())
+        );
+    }
+
+    /// As cubes of such statistics were written before they were told from sums.
+    #[tokio::test]
+    async fn a_statistic_that_was_written_as_a_sum_is_read_and_its_next_step_makes_it_right() {
+        let own = |statistic| description(Quantity::AccumulatedCarbon, statistic);
+        let place = Store::memory();
+        let repository = cube_of(&place, &own(None), 3).await;
+        let session = repository.session().await.unwrap();
+        let store = Arc::new(AsyncIcechunkStore::from(Arc::clone(&session)));
+        let said = own(Some(MapStatistic::Climatology)).attributes();
+        write_group(&store, "", said).await.unwrap();
+        let mut session = session.write().await;
+        session.commit("as before").execute().await.unwrap();
+        drop(session);
+        let repository = Repository::open(&place, "p").await.unwrap();
+        let months = |cube: &crate::Cube| -> Vec<Period> {
+            cube.steps().iter().map(|step| step.period).collect()
+        };
+        let month = |month| Period::month(1970, month).unwrap();
+        let cube = repository.at(&At::Newest).await.unwrap();
+        assert_eq!(months(&cube), [1, 2, 3].map(month));
+        put(&repository, 4..=4).await;
+        let (middles, bounds) = of_months(1..=4);
+        assert_eq!(instants(&repository, |axis| &axis.time).await, middles);
+        assert_eq!(instants(&repository, |axis| &axis.bounds).await, bounds);
+        let cube = repository.at(&At::Newest).await.unwrap();
+        assert_eq!(months(&cube), [1, 2, 3, 4].map(month));
+        let session = cube.session();
+        let path = Path::new("/step_start").unwrap();
+        assert!(session.read().await.get_node(&path).await.is_err());
     }
 
     #[tokio::test]

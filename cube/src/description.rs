@@ -75,8 +75,13 @@ impl Description {
             source: manifest.source.clone(),
             grid: manifest.grid,
             version: Some(version),
-            statistic: manifest.computed.as_ref().and_then(|it| it.how.statistic()),
-        }
+            statistic: over_time.map(|it| it.statistic),
+        })
+    }
+
+    /// Do its values add up since the first step, and not only begin where their step does? Accumulated carbon does, a statistic of it does not.
+    pub fn is_sum(&self) -> bool {
+        self.quantity == Quantity::AccumulatedCarbon && self.statistic.is_none()
     }
 
     /// Attributes of the group.

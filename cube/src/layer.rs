@@ -9,7 +9,7 @@ use icechunk::session::{SessionError, SessionErrorKind};
 use serde_json::{Map, Value};
 use zarrs_icechunk::AsyncIcechunkStore;
 
-use crate::arrays::SERIES;
+use crate::arrays::{SERIES, STEP_START};
 use crate::blocks::RunAxis;
 use crate::field::SeriesEncoder;
 use crate::levels::{self, Levels, MadeOf};
@@ -75,7 +75,8 @@ impl Layer<'_> {
             self.drop_runs(&arrays).await?;
         }
         let compared = if is_anew { &[] } else { &state.steps[..] };
-        let first = plan.first_change(compared);
+        let was_sum = !is_anew && self.drop_step_start().await?;
+        let first = was_sum.then_some(0).or(plan.first_change(compared));
         if let Some(first) = first {
             axis::write(&arrays, description, &plan.steps, first).await?;
         }
@@ -122,6 +123,19 @@ impl Layer<'_> {
         let mut session = self.state.session.write().await;
         let cleared = session.clear().await;
         cleared.map_err(|e| self.failed(&e))
+    }
+
+    /// Removes the starts of steps where a statistic of sums was written as a sum: its times are to be written anew then.
+    async fn drop_step_start(&self) -> Result<bool, CubeError> {
+        if !self.state.has_step_start || self.description.is_sum() {
+            return Ok(false);
+        }
+        let path = Path::new(&format!("/{STEP_START}"));
+        let path = path.map_err(|e| self.repository.failed("placing values", &e))?;
+        let mut session = self.state.session.write().await;
+        let dropped = session.delete_array(path).await;
+        dropped.map_err(|e| self.failed(&e))?;
+        Ok(true)
     }
 
     /// Steps that are there and come to lie elsewhere: by reference.
@@ -185,7 +199,7 @@ impl Layer<'_> {
             let cut = session.delete_chunks(&path, behind).await;
             cut.map_err(|e| self.failed(&e))?;
         }
-        let axis = arrays::axis(self.description.quantity, before as u64)?;
+        let axis = arrays::axis(self.description.is_sum(), before as u64)?;
         for array in axis.arrays() {
             let steps = axis::chunk_steps(array)?;
             let path = Path::new(array.path().as_str());

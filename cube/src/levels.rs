@@ -146,7 +146,7 @@ impl Levels {
         let names = after.iter().map(|own| own.map(|own| own.values_sha256));
         let names: Vec<Option<Digest>> = names.collect();
         let array = arrays::level_names(after.len())?;
-        let own = arrays::axis(description.quantity, steps.len() as u64)?;
+        let own = arrays::axis(description.is_sum(), steps.len() as u64)?;
         let in_chunk = axis::chunk_steps(&array)?;
         let of_chunk = |chunk: usize| {
             let places = chunk * in_chunk..names.len().min((chunk + 1) * in_chunk);
@@ -175,7 +175,7 @@ impl Levels {
         };
         let steps = steps.len();
         for level in level::levels(&description.grid) {
-            let copies = arrays::level_axis(&level, description.quantity, steps as u64)?;
+            let copies = arrays::level_axis(&level, description.is_sum(), steps as u64)?;
             for (from, to) in [&own.time, &own.bounds].into_iter().zip(copies) {
                 describe(store, &to).await?;
                 refer(session, from, &to, first_step..steps).await?;
@@ -195,7 +195,7 @@ impl Levels {
         for level in level::levels(&description.grid) {
             all.extend(arrays::level_axis(
                 &level,
-                description.quantity,
+                description.is_sum(),
                 before as u64,
             )?);
         }

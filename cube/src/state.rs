@@ -21,6 +21,8 @@ pub(crate) struct State {
     /// None of a repository that was made and never committed to.
     pub(crate) description: Option<Description>,
     pub(crate) steps: Vec<Step>,
+    /// Are the starts of steps there beside the bounds of sums?
+    pub(crate) has_step_start: bool,
     /// Runs of the time-major copy.
     pub(crate) runs: Runs,
     /// Sums of blocks.
@@ -39,6 +41,7 @@ impl State {
             Err(e) => return Err(repository.failed("reading the newest state", &e)),
         };
         let snapshot = session.read().await.snapshot_id().to_string();
+        let arrays = Arc::new(AsyncIcechunkStore::from(Arc::clone(&session)));
         let (description, steps, runs, sums, levels) = if is_empty {
             (
                 None,
@@ -48,7 +51,6 @@ impl State {
                 Levels::default(),
             )
         } else {
-            let arrays = Arc::new(AsyncIcechunkStore::from(Arc::clone(&session)));
             let description = Description::of_group(&arrays, &repository.place).await?;
             let steps = axis::read(&arrays, &description, &repository.place).await?;
             let own = session.read().await;
@@ -58,11 +60,16 @@ impl State {
             drop(own);
             (Some(description), steps, runs, sums, levels)
         };
+        let has_step_start = match &description {
+            Some(description) => axis::has_step_start(&arrays, description).await?,
+            None => false,
+        };
         Ok(Self {
             session,
             snapshot,
             description,
             steps,
+            has_step_start,
             runs,
             sums,
             levels,

@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf};
 
 use contract::grid::Grid;
-use contract::quantity::Quantity;
 use contract::time::Period;
 use cube::{Description, cf};
 use hdf5::{Dataset, File, Hyperslab, Location, SliceOrIndex};
@@ -120,7 +119,7 @@ fn begin(
     let file = netcdf4::create(part)?;
     attributes(&file, description.attributes())?;
     let (lat, lon) = cube::places(&description.grid);
-    let time = write_time(&file, description.quantity, periods)?;
+    let time = write_time(&file, description.is_sum(), periods)?;
     let place = |name: &str, centres: &[f64], said| {
         let axis = scale(&file, name, centres)?;
         attributes(&axis, said)?;
@@ -135,7 +134,7 @@ fn begin(
         .iter()
         .flat_map(|period| {
             [
-                bounds_start(description.quantity, periods, *period),
+                bounds_start(description.is_sum(), periods, *period),
                 seconds(period.end.ms()),
             ]
         })
@@ -185,8 +184,7 @@ fn write_values(
 }
 
 /// Where values hold: the middle of what they are a mean over, the end of a sum, of which the steps' starts are written too.
-fn write_time(file: &File, quantity: Quantity, periods: &[Period]) -> hdf5::Result<Dataset> {
-    let is_sum = quantity == Quantity::AccumulatedCarbon;
+fn write_time(file: &File, is_sum: bool, periods: &[Period]) -> hdf5::Result<Dataset> {
     let at = |period: &Period| {
         let time = if is_sum { period.end } else { period.mid() };
         seconds(time.ms())
@@ -212,12 +210,9 @@ fn write_time(file: &File, quantity: Quantity, periods: &[Period]) -> hdf5::Resu
 }
 
 /// A sum is one since the first step.
-fn bounds_start(quantity: Quantity, periods: &[Period], period: Period) -> f64 {
-    let first = match quantity {
-        Quantity::AccumulatedCarbon => periods.first().copied().unwrap_or(period),
-        _ => period,
-    };
-    seconds(first.start.ms())
+fn bounds_start(is_sum: bool, periods: &[Period], period: Period) -> f64 {
+    let first = periods.first().filter(|_| is_sum).copied();
+    seconds(first.unwrap_or(period).start.ms())
 }
 
 fn seconds(ms: i64) -> f64 {

@@ -6,6 +6,7 @@ use std::process::Command;
 
 use arrow::array::{AsArray as _, RecordBatch};
 use arrow::datatypes::{Float32Type, Float64Type};
+use contract::analysis::MapStatistic;
 use contract::grid::Grid;
 use contract::quantity::Quantity;
 use contract::time::Period;
@@ -161,6 +162,27 @@ fn read_back(format: Format, name: &str, quantity: Quantity) {
 fn netcdf_is_read_by_the_netcdf_library() {
     read_back(Format::NetCdf, "netcdf", Quantity::CarbonFlux);
     read_back(Format::NetCdf, "netcdf", Quantity::AccumulatedCarbon);
+}
+
+/// The mean of sums is none of everything since its first step.
+#[test]
+fn a_statistic_of_sums_is_of_its_own_time() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("out");
+    let own = Description {
+        statistic: Some(MapStatistic::Climatology),
+        ..description(Quantity::AccumulatedCarbon)
+    };
+    let mut written = create(Format::NetCdf, &path, &own, &periods()).unwrap();
+    for (step, period) in periods().into_iter().enumerate() {
+        let mut values = std::iter::once(values(step));
+        written.append(period, &mut values).unwrap();
+    }
+    written.finish().unwrap();
+    let mut right = expected(Quantity::AccumulatedCarbon);
+    right["is_sum"] = json!(false);
+    let found = compared("netcdf", &path, &right).unwrap();
+    assert_eq!(found["values"], GRID.cell_count() * 3);
 }
 
 #[test]
