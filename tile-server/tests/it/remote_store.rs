@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use axum::Router;
 use axum::body::Bytes;
@@ -13,6 +13,7 @@ use axum::response::{IntoResponse as _, Response};
 use axum::routing::any;
 use contract::digest::Digest;
 use contract::quantity::Quantity;
+use contract::time::TimeMs;
 use storage::Store;
 use storage::store::{RetryLimits, Settings};
 
@@ -56,8 +57,7 @@ async fn object(
     let mut objects = bucket.objects.lock().unwrap();
     let dated = |content: &Bytes| {
         let mut headers = HeaderMap::new();
-        let date = "Sat, 01 Jan 2000 00:00:00 GMT";
-        headers.insert(header::LAST_MODIFIED, date.parse().unwrap());
+        headers.insert(header::LAST_MODIFIED, date().parse().unwrap());
         let tag = format!("\"{}\"", Digest::of(content));
         headers.insert(header::ETAG, tag.parse().unwrap());
         headers
@@ -85,6 +85,18 @@ async fn object(
             (None, _) => StatusCode::NOT_FOUND.into_response(),
         },
     }
+}
+
+/// Now, as servers say it: whoever commits to a cube compares it with its own clock.
+fn date() -> String {
+    const MONTHS: [&str; 12] = [
+        "Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", "Nov", "Dec",
+    ];
+    let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap();
+    let now = TimeMs::new(since.as_millis() as i64).unwrap().to_string();
+    let (year, month, day, time) = (&now[..4], &now[5..7], &now[8..10], &now[11..19]);
+    let month = MONTHS[month.parse::<usize>().unwrap() - 1];
+    format!("{day} {month} {year} {time} GMT")
 }
 
 /// The first and the last byte that are asked for.
