@@ -217,7 +217,7 @@ async fn what_has_no_history_is_refused() {
     assert!(refused.to_string().contains("after the start"), "{refused}");
     let steps = [(
         Period::month(2000, 1).unwrap(),
-        vec![290.0; GRID.cell_count()],
+        vec![290.0_f32; GRID.cell_count()],
     )];
     let (id, sst) = (product("sst"), Quantity::SeaSurfaceTemperature);
     land(engine.store(), &id, sst, GRID, &steps).await;
