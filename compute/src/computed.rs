@@ -29,14 +29,10 @@ use crate::functions::{COMPUTED_EXTENT, COMPUTED_FIELD};
 use crate::publish::{IsStillAsked, MADE_AGAIN, check_asked, publish_if};
 use crate::summed::check_regridded;
 use crate::{ComputeError, DeriveProgress, Engine, catalogue};
-use job::{ExtentMade, ExtentTask, FieldMade, FieldTask, Job};
+use job::{ExtentMade, ExtentTask, FieldMade, FieldTask, Job, METHOD};
 use matched::{Input, Matched, Matches};
 pub use request::{Request, RequestedInput};
 
-/// Version of the way products are computed: it changes when their bits do.
-///
-/// 2: rounding takes no column from a globe that is brought to another grid; no comparison with what is no number is true.
-const METHOD: u32 = 2;
 /// Values that a task looks through for the cells that hold data: 256 MiB of f32, whatever the grid.
 const RUN_VALUES: usize = 64 << 20;
 /// Steps that it looks through at the least: what it finds is a byte a cell in the store until clean-up.
@@ -164,7 +160,7 @@ impl Plan {
         matched::pressures_of_a_kind(&inputs, &request.how)?;
         matched::places_of_a_kind(&inputs)?;
         if let Computation::Regrid { method, .. } = request.how {
-            check_regridded(engine.store(), first, method).await?;
+            check_regridded(first, method)?;
         }
         let title = match &request.title {
             Some(title) => title.clone(),
@@ -235,6 +231,13 @@ impl Plan {
             let made: Vec<FieldMade> =
                 work::on_engine(engine, COMPUTED_FIELD, &self.job, some).await?;
             for made in made {
+                if made.method != METHOD {
+                    return Err(ComputeError::OtherMethod {
+                        product: self.job.target.clone(),
+                        theirs: made.method,
+                        own: METHOD,
+                    });
+                }
                 for (name, count) in &made.outside {
                     *outside.entry(name.clone()).or_default() += count;
                 }

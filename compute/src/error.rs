@@ -96,6 +96,18 @@ pub enum ComputeError {
         /// Product.
         product: ProductId,
     },
+    /// An executor computed as another version of the program does.
+    #[error(
+        "{product} was computed by an executor of another version, by method {theirs} and not {own}: replace the executors too, then it is computed again"
+    )]
+    OtherMethod {
+        /// Product.
+        product: ProductId,
+        /// The executor's.
+        theirs: u32,
+        /// This program's.
+        own: u32,
+    },
     /// SQL that makes no sense, or would do more than read.
     #[error("SQL: {reason}")]
     Sql {
@@ -228,7 +240,9 @@ impl ComputeError {
             Self::Cluster { source, .. } => {
                 retryable_if(failure::of_ballista(source) == Failure::Passing)
             }
-            Self::Overdue { .. } | Self::AskedOtherwise { .. } => ErrorClass::Retryable,
+            Self::Overdue { .. } | Self::AskedOtherwise { .. } | Self::OtherMethod { .. } => {
+                ErrorClass::Retryable
+            }
             Self::Machine { .. } | Self::Metrics(_) | Self::Inconsistent { .. } => {
                 ErrorClass::Internal
             }

@@ -43,11 +43,10 @@ pub(crate) async fn check_summed(store: &Store, manifest: &Manifest) -> Result<(
 }
 
 /// # Errors
-/// Of the phase of the year's wave, on whichever grid: 31 December and 1 January are next to each other, and the mean of their numbers lies
+/// Of the phase of the year's wave, on whichever grid and wherever it comes from: 31 December and 1 January are next to each other, and the mean of their numbers lies
 /// in July.
-pub(crate) async fn check_averaged(store: &Store, manifest: &Manifest) -> Result<(), ComputeError> {
-    let over_time = manifests::over_time(store, manifest).await?;
-    if over_time.is_none_or(|it| it.statistic != MapStatistic::Phase) {
+pub(crate) fn check_averaged(manifest: &Manifest) -> Result<(), ComputeError> {
+    if !manifest.quantity.is_day_of_year() {
         return Ok(());
     }
     let reason = "it holds days of the year, which go round: the mean of 1 January and 31 December is no day in July; ask for single places";
@@ -58,11 +57,7 @@ pub(crate) async fn check_averaged(store: &Store, manifest: &Manifest) -> Result
 /// # Errors
 /// Of what no mean is to be taken, unless each cell has the value of one: codes of a mask, whose mean is another code, and what
 /// [`check_averaged`] refuses.
-pub(crate) async fn check_regridded(
-    store: &Store,
-    manifest: &Manifest,
-    method: Regridding,
-) -> Result<(), ComputeError> {
+pub(crate) fn check_regridded(manifest: &Manifest, method: Regridding) -> Result<(), ComputeError> {
     match method {
         Regridding::Nearest => Ok(()),
         Regridding::Bilinear | Regridding::Conservative if holds_codes(manifest) => {
@@ -73,15 +68,13 @@ pub(crate) async fn check_regridded(
             );
             Err(ComputeError::Expression { reason })
         }
-        Regridding::Bilinear | Regridding::Conservative => check_averaged(store, manifest).await,
+        Regridding::Bilinear | Regridding::Conservative => check_averaged(manifest),
     }
 }
 
 /// The method that brings a product to another grid with all that it holds: by means, or where there are none by single cells.
 pub(crate) fn usual_regridding(manifest: &Manifest) -> Regridding {
-    let computed = manifest.computed.as_ref();
-    let statistic = computed.and_then(|computed| computed.how.statistic());
-    if holds_codes(manifest) || statistic == Some(MapStatistic::Phase) {
+    if holds_codes(manifest) || manifest.quantity.is_day_of_year() {
         Regridding::Nearest
     } else {
         Regridding::Conservative

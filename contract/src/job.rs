@@ -117,8 +117,9 @@ pub enum View {
     },
 }
 
-/// What a picture looks like.
+/// What a picture looks like. A word that is not known is refused: it would be another picture.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Style {
     /// Value to colour.
     pub transfer: TransferFunction,
@@ -325,6 +326,14 @@ impl RenderJob {
         self.validate_trails()?;
         self.validate_annotations()?;
         self.style.validate()?;
+        if self.style.nearest && self.style.context.isolines.is_some() {
+            let reason = "codes, directions and days of the year have nothing between two of them that lines could run through; leave isolines out";
+            return Err(ContractError::invalid(
+                "isolines",
+                self.value.product(),
+                reason,
+            ));
+        }
         let Style {
             context,
             globe_surface,

@@ -7,7 +7,6 @@ mod paged;
 
 use serde::{Deserialize, Serialize};
 
-use crate::analysis::MapStatistic;
 use crate::computed::Computed;
 use crate::digest::Digest;
 use crate::grid::Grid;
@@ -164,13 +163,6 @@ impl Manifest {
         })
     }
 
-    /// Is there something between two of its values? Not of codes and directions, and not of days of a year, of which the mean of the last
-    /// and the first is in July.
-    pub fn is_linear(&self) -> bool {
-        let statistic = self.computed.as_ref().and_then(|own| own.how.statistic());
-        self.quantity.is_linear() && statistic != Some(MapStatistic::Phase)
-    }
-
     /// The two steps an instant lies between, and how far it has come from the first (0) to the second (1). Of values that have nothing
     /// between two of them it is one step: the one that the instant lies in, else the nearer one.
     ///
@@ -211,7 +203,7 @@ impl Manifest {
             });
         }
         let weight = share(at(&self.steps[after - 1]), at(&self.steps[after]));
-        if !self.is_linear() {
+        if !self.quantity.is_linear() {
             return Some(self.nearer(time, after, weight));
         }
         Some(Bracket {
@@ -346,7 +338,7 @@ mod tests {
             };
             assert_eq!(bracket, one, "{time}");
         }
-        assert!(manifest(Quantity::CarbonFlux).is_linear());
+        assert!(Quantity::CarbonFlux.is_linear());
     }
 
     #[test]

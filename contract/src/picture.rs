@@ -272,7 +272,7 @@ impl RenderJob {
             mode,
             view,
             style: Style {
-                nearest: !product.is_linear(),
+                nearest: !product.quantity.is_linear(),
                 ..style
             },
             annotations: None,

@@ -82,6 +82,9 @@ impl Display {
     }
 }
 
+/// What the name of a map of the day of the year ends with that the yearly wave of a quantity has its crest on.
+pub const ANNUAL_PHASE: &str = "_annual_phase";
+
 impl Quantity {
     /// Every quantity that is built in.
     pub const ALL: [Self; 19] = [
@@ -242,10 +245,15 @@ impl Quantity {
         }
     }
 
-    /// Does what lies half-way between two of its values lie half-way between what they mean? Not of codes, and not of directions, of which the
-    /// mean of 359 and 1 degree is 0 and not 180.
+    /// Is it the day of the year that a yearly wave has its crest on, by the name and the unit that such maps have?
+    pub fn is_day_of_year(self) -> bool {
+        matches!(self, Self::Open(_)) && self.unit() == "day" && self.word().ends_with(ANNUAL_PHASE)
+    }
+
+    /// Does what lies half-way between two of its values lie half-way between what they mean? Not of codes; not of directions, of which the
+    /// mean of 359 and 1 degree is 0 and not 180; and not of days of a year, of which that of the last and the first is in July.
     pub fn is_linear(self) -> bool {
-        self.flags().is_empty() && self.units_per_turn().is_none()
+        self.flags().is_empty() && self.units_per_turn().is_none() && !self.is_day_of_year()
     }
 
     /// What a code means.

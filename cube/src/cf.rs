@@ -196,7 +196,7 @@ pub(crate) fn of_level_values(description: &Description) -> Map<String, Value> {
             "where the mean of unit vectors by area points, over the cells that hold data; none where they cancel"
         }
         Method::Sample => {
-            "the value of one cell of the block, that of its middle where it holds data: codes have no mean"
+            "the value of one cell of the block, that of its middle where it holds data: codes, and days of a year, have no mean"
         }
     };
     let rounded = match Method::of(quantity) {

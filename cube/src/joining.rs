@@ -39,6 +39,9 @@ impl Method {
         let Quantity::Open(_) = quantity else {
             return Self::Mean;
         };
+        if !quantity.flags().is_empty() || quantity.is_day_of_year() {
+            return Self::Sample;
+        }
         match (quantity.unit(), quantity.units_per_turn()) {
             ("" | "1", _) => Self::Sample,
             (_, Some(turn)) => Self::Direction { turn },
@@ -314,6 +317,8 @@ mod tests {
         }
         // A known quantity without a unit is a share, and has a mean.
         assert_eq!(Method::of(Quantity::IceFraction), Method::Mean);
+        let phase = Quantity::open("sst_annual_phase", "day", "Phase").unwrap();
+        assert_eq!(Method::of(phase), Method::Sample);
     }
 
     #[test]

@@ -16,6 +16,7 @@ mod shared_struct;
 
 mod adapter;
 mod backend;
+mod by_domain;
 pub mod coast;
 mod device;
 mod device_slot;

@@ -26,6 +26,9 @@ const LEAST_FLOW_CELL_PX: f64 = 4.0;
 /// Cells of the terrain smaller than this are joined, pixels: one pixel shows one cell, so what lies between is lost.
 const LEAST_TERRAIN_CELL_PX: f64 = 1.0;
 
+/// In the place of the number of a domain: every cell counts all over.
+const ALL_OVER: u64 = u64::MAX;
+
 /// The earth whose areas pictures go by.
 const EARTH: Earth = Earth::Wgs84;
 
@@ -53,7 +56,9 @@ fn suited_terrain(job: &RenderJob, terrain: &Terrain) -> Option<Terrain> {
             return suited;
         };
         let blocks = Blocks::new(&finest.grid, &grid, EARTH, None);
-        let elevation = finest.elevation.coarser_mean(|cells| blocks.mean(cells));
+        let elevation = finest
+            .elevation
+            .coarser_mean(ALL_OVER, |cells| blocks.mean(cells));
         suited = Some(Terrain { grid, elevation });
     }
 }
@@ -121,8 +126,10 @@ fn joined(scene: &Scene, has_no_mean: bool) -> Option<Scene> {
         None => halved(fine)?,
     };
     let blocks = Blocks::new(fine, &grid, EARTH, Some(scene.domain.content()));
+    // One field is drawn with those of several products, whose blocks are weighed by other domains.
+    let domain = scene.domain.id();
     let mean = |field: &Arc<Field>| {
-        field.coarser_mean(|cells| {
+        field.coarser_mean(domain, |cells| {
             if has_no_mean {
                 blocks.sample(cells)
             } else {
@@ -130,7 +137,7 @@ fn joined(scene: &Scene, has_no_mean: bool) -> Option<Scene> {
             }
         })
     };
-    let mass = |field: &Arc<Field>| field.coarser_mass(|cells| blocks.mass(cells));
+    let mass = |field: &Arc<Field>| field.coarser_mass(domain, |cells| blocks.mass(cells));
     let both = |interval: &Interval, coarser: &dyn Fn(&Arc<Field>) -> Arc<Field>| Interval {
         before: coarser(&interval.before),
         after: coarser(&interval.after),
@@ -396,6 +403,36 @@ mod tests {
                 assert!(levels >= 6);
             }
         }
+    }
+
+    #[test]
+    fn a_field_is_joined_by_the_domain_that_it_is_drawn_with_whoever_drew_it_before() {
+        let grid = grid(4, 8, [90.0, -180.0], 45.0);
+        let values = (0..grid.cell_count()).map(|cell| cell as f32).collect();
+        let field = Arc::new(Field::new(values));
+        let scene = |domain: fn(usize) -> bool| {
+            let interval = Interval {
+                before: Arc::clone(&field),
+                after: Arc::clone(&field),
+                weight: 0.0,
+            };
+            Scene {
+                grid,
+                domain: Scene::domain_of((0..grid.cell_count()).map(domain)),
+                value: interval,
+                accumulated: None,
+                terrain: None,
+                northward: None,
+                trails: None,
+                whole: None,
+            }
+        };
+        let first = |scene: &Scene| coarser(scene).unwrap().value.before.cells.content()[0];
+        // Of the cells 0, 1, 8 and 9 the first two, or the last one.
+        let (north, one) = (scene(|cell| cell < 8), scene(|cell| cell == 9));
+        let (of_north, of_one) = (first(&north), first(&one));
+        assert!((of_north - 0.5).abs() < 1e-6 && (of_one - 9.0).abs() < 1e-6);
+        assert_eq!(first(&north).to_bits(), of_north.to_bits());
     }
 
     #[test]

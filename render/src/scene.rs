@@ -6,6 +6,7 @@ use std::sync::{Arc, OnceLock};
 
 use contract::grid::Grid;
 
+use crate::by_domain::ByDomain;
 use crate::error::RenderError;
 use crate::stages::fill::Filled;
 use crate::stages::layout::{COVERED, MISSING, is_missing};
@@ -76,9 +77,9 @@ pub struct Field {
     /// Is it a part of a field, whose range and largest error these are?
     is_part: bool,
     /// Means over blocks of four.
-    coarser_mean: OnceLock<Arc<Field>>,
+    coarser_mean: ByDomain<Field>,
     /// What keeps the mass of blocks of four.
-    coarser_mass: OnceLock<Arc<Field>>,
+    coarser_mass: ByDomain<Field>,
     /// Share of the accumulated time that every sum lacks, 0 to 1; none where all sums are complete, where values are
     /// no sums, and where nobody asked.
     lacking: Option<Vec<f32>>,
@@ -108,8 +109,8 @@ impl Field {
             largest_error: 0.0,
             range: range.unwrap_or_default(),
             is_part: false,
-            coarser_mean: OnceLock::new(),
-            coarser_mass: OnceLock::new(),
+            coarser_mean: ByDomain::new(),
+            coarser_mass: ByDomain::new(),
             lacking: None,
             uncertainties: OnceLock::new(),
         }
@@ -198,8 +199,9 @@ impl Field {
         self.largest_error > 0.0 || self.lacking.is_some()
     }
 
-    /// Blocks of four; an error becomes the mean of the four, as if they were wrong together, and so does what they lack.
-    pub(crate) fn coarser_mean(&self, make: impl Fn(&[f32]) -> Vec<f32>) -> Arc<Self> {
+    /// Blocks of four, weighed by a domain; an error becomes the mean of the four, as if they were wrong together, and so does what they
+    /// lack.
+    pub(crate) fn coarser_mean(&self, domain: u64, make: impl Fn(&[f32]) -> Vec<f32>) -> Arc<Self> {
         let coarser = || {
             let mut coarser = Self::new(make(&self.cells.content));
             if let Some(errors) = &self.errors {
@@ -210,12 +212,16 @@ impl Field {
             }
             Arc::new(coarser.of_the_same(self))
         };
-        Arc::clone(self.coarser_mean.get_or_init(coarser))
+        self.coarser_mean.get_or_init(domain, coarser)
     }
 
-    pub(crate) fn coarser_mass(&self, make: impl FnOnce(&[f32]) -> Vec<f32>) -> Arc<Self> {
+    pub(crate) fn coarser_mass(
+        &self,
+        domain: u64,
+        make: impl FnOnce(&[f32]) -> Vec<f32>,
+    ) -> Arc<Self> {
         let coarser = || Arc::new(Self::new(make(&self.cells.content)).of_the_same(self));
-        Arc::clone(self.coarser_mass.get_or_init(coarser))
+        self.coarser_mass.get_or_init(domain, coarser)
     }
 
     /// Bytes held, coarser versions left out: they add a third at most.

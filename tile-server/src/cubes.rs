@@ -10,6 +10,7 @@ use prometheus::IntGauge;
 use quick_cache::sync::Cache;
 use storage::Store;
 
+use crate::backend::Turn;
 use crate::client::Client;
 use crate::error::ServerError;
 use crate::gate::Gate;
@@ -108,20 +109,27 @@ impl Cubes {
     }
 
     /// The value of a key of a version that is open, or a part of it; none if there is no such key. `bytes` is its length, or that of
-    /// the part.
+    /// the part. Where there is no room for it, somebody else has the turn meanwhile.
     ///
     /// # Errors
-    /// `Busy` if more would be held than may be.
+    /// `Busy` if as many of this client wait for room as may.
     pub(crate) async fn get(
         &self,
         keys: &Keys,
         key: &str,
-        range: Option<Range<u64>>,
-        bytes: u64,
+        (range, bytes): (Option<Range<u64>>, u64),
+        turn: Turn,
     ) -> Result<Option<Bytes>, ServerError> {
         // One that is larger than a client's share is given out alone, and not refused for ever.
         let bytes = bytes.min(self.held.client_limit_bytes());
-        let room = self.held.enter(Client::asking(), bytes)?;
+        let client = Client::asking();
+        let (room, _turn) = match self.held.enter(client, bytes) {
+            Ok(room) => (room, Some(turn)),
+            Err(_full) => {
+                drop(turn);
+                (self.held.wait(client, bytes).await?, None)
+            }
+        };
         let content = self.answered(keys, keys.get(key, range).await)?;
         // The room goes with the bytes, not with the body: that one ends when they lie in the connection's queue.
         Ok(content.map(|content| {

@@ -4,9 +4,13 @@ use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use prometheus::IntGauge;
+use tokio::sync::Notify;
 
 use crate::client::Client;
 use crate::error::ServerError;
+
+/// Most that wait for room of one client: whoever takes nothing of what he asked for must not fill the queue of all.
+const MOST_WAITING: u32 = 256;
 
 /// Bounds what is held. Clones are the same bounds.
 #[derive(Debug, Clone)]
@@ -20,6 +24,10 @@ struct Held {
     clients: Mutex<HashMap<Client, u64>>,
     /// Those of all clients, for who watches.
     bytes: IntGauge,
+    /// How many wait, by client.
+    waiting: Mutex<HashMap<Client, u32>>,
+    /// Told when some room is free again.
+    freed: Notify,
 }
 
 impl Held {
@@ -36,6 +44,41 @@ impl Held {
             }
         }
         self.bytes.set(clients.values().sum::<u64>() as i64);
+        drop(clients);
+        self.freed.notify_waiters();
+    }
+
+    fn waiting(&self) -> MutexGuard<'_, HashMap<Client, u32>> {
+        self.waiting.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// One that waits; counted until this is dropped.
+struct Waiting<'a> {
+    held: &'a Held,
+    client: Client,
+}
+
+impl<'a> Waiting<'a> {
+    /// None if as many wait of this client as may.
+    fn of(held: &'a Held, client: Client) -> Option<Self> {
+        let mut waiting = held.waiting();
+        let own = waiting.entry(client).or_default();
+        let has_place = *own < MOST_WAITING;
+        *own += u32::from(has_place);
+        has_place.then_some(Self { held, client })
+    }
+}
+
+impl Drop for Waiting<'_> {
+    fn drop(&mut self) {
+        let mut waiting = self.held.waiting();
+        if let Some(own) = waiting.get_mut(&self.client) {
+            *own -= 1;
+            if *own == 0 {
+                waiting.remove(&self.client);
+            }
+        }
     }
 }
 
@@ -69,6 +112,8 @@ impl Rooms {
             limit_bytes,
             clients: Mutex::default(),
             bytes,
+            waiting: Mutex::default(),
+            freed: Notify::new(),
         }))
     }
 
@@ -95,6 +140,23 @@ impl Rooms {
         })
     }
 
+    /// Waits for room.
+    ///
+    /// # Errors
+    /// `Busy` if as many of this client wait as may.
+    pub(crate) async fn wait(&self, client: Client, bytes: u64) -> Result<Room, ServerError> {
+        let _waiting = Waiting::of(&self.0, client).ok_or(ServerError::Busy)?;
+        loop {
+            // Heard from here on: what is given back before it is looked for is not missed.
+            let mut freed = std::pin::pin!(self.0.freed.notified());
+            freed.as_mut().enable();
+            match self.enter(client, bytes) {
+                Err(ServerError::Busy) => freed.await,
+                entered => return entered,
+            }
+        }
+    }
+
     /// Bytes that are held.
     #[cfg(test)]
     pub(crate) fn held_bytes(&self) -> u64 {
@@ -107,9 +169,32 @@ mod tests {
     use std::net::SocketAddr;
 
     use super::*;
+    use futures::FutureExt as _;
 
     fn client(number: u8) -> Client {
         Client::at(SocketAddr::from(([192, 0, 2, number], 1)))
+    }
+
+    #[tokio::test]
+    async fn who_waits_has_room_when_some_is_given_back_and_few_of_one_client_wait() {
+        let rooms = Rooms::new(
+            400,
+            IntGauge::new("held_bytes", "Bytes that are held.").unwrap(),
+        );
+        let own = rooms.enter(client(1), 200).unwrap();
+        let mut waiting = Box::pin(rooms.wait(client(1), 150));
+        assert!(waiting.as_mut().now_or_never().is_none());
+        drop(own);
+        let room = waiting.await.unwrap();
+        let wait = || Box::pin(rooms.wait(client(1), 100));
+        let mut all: Vec<_> = (0..MOST_WAITING).map(|_| wait()).collect();
+        for one in &mut all {
+            assert!(one.as_mut().now_or_never().is_none());
+        }
+        assert!(matches!(wait().await, Err(ServerError::Busy)));
+        assert!(rooms.wait(client(2), 100).await.is_ok(), "another client");
+        drop((all, room));
+        assert!(rooms.0.waiting().is_empty() && rooms.held_bytes() == 0);
     }
 
     #[test]

@@ -45,7 +45,7 @@ pub fn hovmoller<'a>(
     query: &'a HovmollerQuery,
 ) -> BoxFuture<'a, Result<Hovmoller, ComputeError>> {
     Box::pin(async move {
-        check_averaged(engine.store(), manifest).await?;
+        check_averaged(manifest)?;
         let (window, steps) = manifest.steps_inside(query.from, query.to)?;
         let grid = &manifest.grid;
         let band_deg = band_deg(manifest, query)?;

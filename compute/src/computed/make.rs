@@ -9,7 +9,7 @@ use storage::domain::Cells;
 use storage::fields::Spooled;
 use storage::{Store, domain, fields};
 
-use super::job::{ExtentMade, ExtentTask, FieldMade, FieldTask, Job};
+use super::job::{ExtentMade, ExtentTask, FieldMade, FieldTask, Job, METHOD};
 use super::read::{Inputs, SlidingRows};
 use crate::ComputeError;
 use crate::expression::Expression;
@@ -179,6 +179,7 @@ impl<'a> Making<'a> {
     async fn finish(self, store: &Store, index: usize) -> Result<FieldMade, ComputeError> {
         let (field, valid_cells) = self.field.put(store, &self.job.target).await?;
         Ok(FieldMade {
+            method: METHOD,
             index,
             field,
             valid_cells,

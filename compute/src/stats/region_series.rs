@@ -35,7 +35,7 @@ pub fn region_series_of<'a>(
     manifest: &'a Manifest,
 ) -> BoxFuture<'a, Result<RegionSeries, ComputeError>> {
     Box::pin(async move {
-        check_averaged(engine.store(), manifest).await?;
+        check_averaged(manifest)?;
         let id = manifest.id();
         let means = match manifest.quantity {
             // Sums as budgets have them are in steps of 1e-9 of the unit: nothing of a concentration of 1e-17, too many of a heat of 1e11.

@@ -70,8 +70,6 @@ features! { params;
     HAS_ACCUMULATED: params.values.has_accumulated == 1,
     /// Colours are those of logarithms.
     IS_LOG: params.values.is_log == 1,
-    /// Pixels of a thematic map have the value of their cell.
-    IS_NEAREST: params.values.is_nearest == 1,
     /// The range of colours lies on both sides of zero.
     IS_DIVERGING: params.particles.diverging == 1,
     /// Particles are lit.
@@ -90,6 +88,8 @@ features! { params;
     IS_PERIODIC: params.grid.periodic == 1,
     /// Values over land are left out.
     MASKS_LAND: params.context.land_masked == 1,
+    /// Pixels of a thematic map have the value of their cell.
+    IS_NEAREST: params.values.is_nearest == 1,
 }
 
 impl Features {

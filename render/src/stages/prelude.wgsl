@@ -107,6 +107,7 @@ const HAS_CLOUDS: u32 = 16777216u;
 const HAS_SEA_DEPTH: u32 = 33554432u;
 const IS_PERIODIC: u32 = 67108864u;
 const MASKS_LAND: u32 = 134217728u;
+const IS_NEAREST: u32 = 268435456u;
 
 // What a kernel is compiled for; see `features.rs`.
 override FEATURES: u32 = ASKED;

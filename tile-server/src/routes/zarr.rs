@@ -12,6 +12,7 @@ use cube::Keys;
 
 use crate::error::ServerError;
 use crate::extract::UrlPath;
+use crate::gate::Pass;
 use crate::routes::picture::{CACHE_CONTROL, CACHE_CONTROL_PINNED, has_tag};
 use crate::state::AppState;
 
@@ -53,7 +54,10 @@ pub(crate) async fn get(
         (header::CACHE_CONTROL, cache_control.to_owned()),
         (header::ACCEPT_RANGES, "bytes".to_owned()),
     ];
-    let _pass = state.cubes.reads.enter().await?;
+    let Pass {
+        place: _place,
+        turn,
+    } = state.cubes.reads.enter().await?;
     let length = state.cubes.length(&keys, &key).await?;
     let length = length.ok_or(ServerError::UnknownAddress)?;
     if has_tag(&asked, &tag) {
@@ -65,7 +69,7 @@ pub(crate) async fn get(
         None
     };
     let bytes = range.as_ref().map_or(length, |part| part.end - part.start);
-    let read = state.cubes.get(&keys, &key, range.clone(), bytes);
+    let read = state.cubes.get(&keys, &key, (range.clone(), bytes), turn);
     let content = read.await.inspect_err(|error| {
         if matches!(error, ServerError::Busy) {
             state.metrics.refused.inc();

@@ -137,6 +137,8 @@ mod tests {
             (quantity.word(), quantity.unit(), factor)
         };
         let sst = Quantity::SeaSurfaceTemperature;
+        let phase = super::of(sst, None, MapStatistic::Phase).unwrap().0;
+        assert!(phase.is_day_of_year() && !phase.is_linear());
         assert_eq!(
             of(sst, MapStatistic::Mean),
             ("sea_surface_temperature", "K", 1.0)
