@@ -18,6 +18,9 @@ use crate::plan::cf::calendar::{Calendar, TimeUnit};
 use crate::plan::method;
 use crate::plan::unit;
 
+/// Depth down to which ships take in and buoys meet what they call surface water; their sensors and hulls reach to 3 to 10 m.
+const SURFACE_M: f64 = 20.0;
+
 /// A measured variable with all that its samples need.
 pub(super) struct Measured<'a> {
     pub(super) variable: &'a Variable,
@@ -27,6 +30,8 @@ pub(super) struct Measured<'a> {
     pub(super) latitude: Coordinate,
     pub(super) longitude: Coordinate,
     pub(super) depth: Option<(Coordinate, ToDepth)>,
+    /// Are samples at depths of all kinds, so that nobody knows how deep one is whose depth is missing?
+    pub(super) is_of_depths: bool,
     pub(super) flags: Vec<(Coordinate, Scheme)>,
     /// Mode of each cast of a float, where that says whether the variable counts.
     pub(super) mode: Option<Coordinate>,
@@ -168,6 +173,11 @@ pub(super) async fn prepare<'a>(
         let detail = "has values at several depths, and nothing says which; give a depth in m, or sea_water_pressure in dbar";
         return refuse(RejectReason::NoVariable, detail.to_owned());
     }
+    let is_deep = |(coordinate, to): &(Coordinate, ToDepth)| {
+        is_by_level(variable, coordinate, &[&time, &latitude, &longitude])
+            || reaches_down(coordinate, *to)
+    };
+    let is_of_depths = is_of_casts || depth.as_ref().is_some_and(is_deep);
     let mode = match argo::mode(file, variable) {
         Some(mode) => coordinate::beside(session, mode, variable, sampling).await?,
         None => None,
@@ -180,6 +190,7 @@ pub(super) async fn prepare<'a>(
         latitude,
         longitude,
         depth,
+        is_of_depths,
         flags: flags(session, file, variable, sampling).await?,
         variable,
     }))
@@ -230,6 +241,22 @@ fn has_levels(variable: &Variable, sampling: &Sampling, known: &[&Coordinate]) -
             dimension.name.is_some() && dimension.name.as_deref() == sampling.sample_dimension();
         is_of_samples || !known.iter().any(|of| of.varies_along(place))
     })
+}
+
+/// Does a depth run along a dimension of its own, that neither times nor places run along?
+fn is_by_level(variable: &Variable, depth: &Coordinate, others: &[&Coordinate]) -> bool {
+    let mut dimensions = variable.dimensions.iter().enumerate();
+    dimensions.any(|(place, dimension)| {
+        dimension.len > 1
+            && depth.varies_along(place)
+            && !others.iter().any(|of| of.varies_along(place))
+    })
+}
+
+/// Is one of the depths of a coordinate beyond what ships and buoys measure "the surface" at: that of a glider or a diver?
+fn reaches_down(depth: &Coordinate, to: ToDepth) -> bool {
+    // Only casts have their depth by pressure, for which alone the latitude matters.
+    (depth.values.iter()).any(|number| to.depth_m(*number, 0.0) > SURFACE_M)
 }
 
 fn time_unit(file: &Description, name: &str) -> Result<TimeUnit, String> {

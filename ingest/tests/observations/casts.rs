@@ -1,7 +1,7 @@
 //! Casts: whose they are, and how deep each of their samples is.
 
 use contract::event::RejectReason;
-use contract::observation::Quality;
+use contract::observation::{Observation, Quality};
 
 use crate::made::{Draft, SST, observations, read, refusal, seen, settings};
 
@@ -164,6 +164,38 @@ async fn a_sample_whose_depth_is_not_said_is_counted_and_left_out() {
     let (found, masked) = read(&file, &settings()).await.unwrap();
     let depths: Vec<f64> = found.iter().map(|o| o.depth_m).collect();
     assert_eq!((depths, masked.implausible), (vec![1.0, 1.0, 2.0], 1));
+}
+
+/// Depths and counted losses of what a ship, or another that goes along a way, measured twice; the second depth is missing.
+async fn along_a_way(first_m: f64) -> (Vec<(String, f64)>, u64) {
+    let folder = tempfile::tempdir().unwrap();
+    let fugacity = [
+        ("standard_name", "fugacity_of_carbon_dioxide_in_sea_water"),
+        ("units", "uatm"),
+    ];
+    let wind = [("standard_name", "wind_speed"), ("units", "m s-1")];
+    let file = Draft::new("trajectory", &[("obs", 2)])
+        .axes("obs", "obs", 2, 2)
+        .variable("depth", &["obs"], DEPTH, vec![first_m, f64::NAN])
+        .variable("fco2", &["obs"], &fugacity, vec![380.0, 381.0])
+        .variable("wind", &["obs"], &wind, vec![5.0, 6.0])
+        .write(folder.path());
+    let (found, masked) = read(&file, &settings()).await.unwrap();
+    let own = |o: Observation| (o.property, o.depth_m);
+    (found.into_iter().map(own).collect(), masked.implausible)
+}
+
+#[tokio::test]
+async fn a_sample_of_the_surface_without_a_depth_is_kept_and_one_of_a_glider_is_counted() {
+    let (found, lost) = along_a_way(5.0).await;
+    let (fugacity, wind) = ("fugacity_of_carbon_dioxide_in_sea_water", "wind_speed");
+    let expected = [(fugacity, 5.0), (fugacity, 0.0), (wind, 5.0), (wind, 0.0)];
+    let expected = expected.map(|(property, depth_m)| (property.to_owned(), depth_m));
+    assert_eq!((found, lost), (expected.to_vec(), 0));
+    let (found, lost) = along_a_way(300.0).await;
+    assert_eq!((found.len(), lost), (2, 2));
+    let is_deep = |(_, depth_m): &(String, f64)| (depth_m - 300.0).abs() < 1e-9;
+    assert!(found.iter().all(is_deep), "{found:?}");
 }
 
 #[tokio::test]
