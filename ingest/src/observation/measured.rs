@@ -62,7 +62,7 @@ pub(super) fn is_candidate(file: &Description, variable: &Variable) -> bool {
     let is_remark = epic::code_of(variable).is_some_and(epic::is_remark)
         || attributes
             .text("standard_name")
-            .is_some_and(|name| name.ends_with("status_flag"))
+            .is_some_and(quality::is_flag_name)
         || [
             "flag_values",
             "flag_masks",

@@ -37,6 +37,25 @@ async fn errors_and_counts_beside_a_variable_are_no_flags_of_it() {
 }
 
 #[tokio::test]
+async fn flags_of_many_names_are_read_and_what_is_bad_is_bad() {
+    for name in [
+        "sst_quality_control",
+        "sst_quality",
+        "sst_flags",
+        "SST_SEADATANET",
+    ] {
+        let draft = buoy(&[("ancillary_variables", name)]).letters(name, &["time"], &[], "134");
+        let qualities: Vec<Quality> = of(draft).await.iter().map(|o| o.quality).collect();
+        let expected = [Quality::Good, Quality::Questionable, Quality::Bad];
+        assert_eq!(qualities, expected, "{name}");
+    }
+    let draft = buoy(&[("ancillary_variables", "SST_WOCE")]);
+    let draft = draft.letters("SST_WOCE", &["time"], &[], "249");
+    let qualities: Vec<Quality> = of(draft).await.iter().map(|o| o.quality).collect();
+    assert_eq!(qualities, [Quality::Good, Quality::Bad], "9 is missing");
+}
+
+#[tokio::test]
 async fn spreads_and_extremes_are_not_taken_for_values() {
     for methods in [
         "time: standard_deviation",
