@@ -37,6 +37,8 @@ pub(super) struct Gathered {
     out_of_range: u64,
     /// Values without a place or a time.
     unplaced: u64,
+    /// Values that do not count in the mode of their cast, where there is none that does.
+    superseded: u64,
     /// By property.
     tallies: BTreeMap<String, Tally>,
 }
@@ -95,6 +97,11 @@ impl Gathered {
         self.unplaced += 1;
     }
 
+    /// Counts a value that was taken back and that no other one took the place of.
+    pub(super) fn superseded(&mut self) {
+        self.superseded += 1;
+    }
+
     fn tally(&mut self, property: &str) -> &mut Tally {
         // Most observations are of a property that came before.
         if !self.tallies.contains_key(property) {
@@ -123,8 +130,8 @@ impl Gathered {
         }
         let masked = MaskedCells {
             out_of_range: self.out_of_range,
+            poor_quality: self.superseded,
             implausible,
-            ..MaskedCells::default()
         };
         if self.found.is_empty() && !masked.is_none() {
             let detail = format!(

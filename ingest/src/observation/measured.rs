@@ -33,8 +33,8 @@ pub(super) struct Measured<'a> {
     /// Are samples at depths of all kinds, so that nobody knows how deep one is whose depth is missing?
     pub(super) is_of_depths: bool,
     pub(super) flags: Vec<(Coordinate, Scheme)>,
-    /// Mode of each cast of a float, where that says whether the variable counts.
-    pub(super) mode: Option<Coordinate>,
+    /// Mode of each cast of a float, where that says whether the variable counts, and the values that count where it does not.
+    pub(super) mode: Option<(Coordinate, Option<Coordinate>)>,
 }
 
 /// How a vertical coordinate becomes metres below the surface.
@@ -178,10 +178,7 @@ pub(super) async fn prepare<'a>(
             || reaches_down(coordinate, *to)
     };
     let is_of_depths = is_of_casts || depth.as_ref().is_some_and(is_deep);
-    let mode = match argo::mode(file, variable) {
-        Some(mode) => coordinate::beside(session, mode, variable, sampling).await?,
-        None => None,
-    };
+    let mode = mode(session, file, variable, sampling).await?;
     Ok(Ok(Measured {
         mode,
         conversion,
@@ -194,6 +191,25 @@ pub(super) async fn prepare<'a>(
         flags: flags(session, file, variable, sampling).await?,
         variable,
     }))
+}
+
+/// The mode of each cast of a float and the values of the variable's twin, if it has one.
+async fn mode(
+    session: &mut Session,
+    file: &Description,
+    variable: &Variable,
+    sampling: &Sampling,
+) -> Result<Option<(Coordinate, Option<Coordinate>)>, Stop> {
+    let Some(twin) = argo::twin(file, variable) else {
+        return Ok(None);
+    };
+    let Some(modes) = argo::modes(session, file, variable).await? else {
+        return Ok(None);
+    };
+    let modes = (modes.dimensions.as_slice(), modes.values);
+    let mode = coordinate::along("the modes of casts", modes, variable, sampling);
+    let twin = coordinate::beside(session, twin, variable, sampling).await?;
+    Ok(mode.map(|mode| (mode, twin)))
 }
 
 /// Where the values of a variable are; measured places are at themselves.
@@ -295,12 +311,15 @@ async fn depth(
     if found.is_none() && is_of_casts {
         found = coordinate::find(session, file, variable, sampling, Says::Pressure).await?;
     }
-    let Some(found) = found else {
+    let Some(mut found) = found else {
         return Ok(Ok(None));
     };
     let Some(vertical) = file.variable(&found.name) else {
         return Ok(Ok(None));
     };
+    if let Some(values) = argo::counting(session, file, vertical).await? {
+        found.values = values;
+    }
     Ok(match to_depth(vertical) {
         Ok(to) => Ok(Some((found, to))),
         Err(detail) => Err(Rejection::new(RejectReason::Unit, &found.name, detail)),

@@ -158,10 +158,6 @@ fn sample(
     gathered: &mut Gathered,
 ) -> Result<(), Rejection> {
     let at = |coordinate: &Coordinate| coordinate.at(cell, &shared.sampling);
-    let mode = measured.mode.as_ref().map(at);
-    if mode.is_some_and(|mode| !argo::counts(measured.variable, mode)) {
-        return Ok(());
-    }
     let verdicts = measured
         .flags
         .iter()
@@ -170,6 +166,14 @@ fn sample(
     let Some(quality) = verdict.unwrap_or(Some(Quality::NotEvaluated)) else {
         return Ok(());
     };
+    if let Some((mode, twin)) = &measured.mode
+        && !argo::counts(measured.variable, at(mode))
+    {
+        if twin.as_ref().is_none_or(|twin| at(twin).is_nan()) {
+            gathered.superseded();
+        }
+        return Ok(());
+    }
     let conversion = &measured.conversion;
     let value = match number {
         Unpacked::Value(number) => conversion.given(number),
