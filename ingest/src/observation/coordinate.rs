@@ -6,7 +6,7 @@ use super::pressure;
 use super::sampling::Sampling;
 use super::values::read;
 use crate::error::Stop;
-use crate::inspect::file::description::{Description, Variable};
+use crate::inspect::file::description::{Description, Dimension, Variable};
 use crate::inspect::reader::session::Session;
 use crate::plan::cf::coordinate::{Role, role_of};
 
@@ -104,15 +104,15 @@ pub(super) fn says(variable: &Variable) -> Option<Says> {
     is_depth.then_some(Says::Depth)
 }
 
-/// How a cell of `measured` finds its value in `variable`; none if it cannot.
+/// How a cell of `measured` finds its value among those along these dimensions; none if it cannot.
 fn steps(
-    variable: &Variable,
+    dimensions: &[Dimension],
     measured: &Variable,
     sampling: &Sampling,
 ) -> Option<Vec<(Index, usize)>> {
     let mut stride = 1usize;
     let mut steps = vec![];
-    for dimension in variable.dimensions.iter().rev() {
+    for dimension in dimensions.iter().rev() {
         let own = measured
             .dimensions
             .iter()
@@ -177,7 +177,7 @@ pub(super) async fn find(
     best.sort_by_key(|v| rank(v));
     let found = best
         .into_iter()
-        .find_map(|v| steps(v, measured, sampling).map(|steps| (v, steps)));
+        .find_map(|v| steps(&v.dimensions, measured, sampling).map(|steps| (v, steps)));
     let Some((variable, steps)) = found else {
         return Ok(None);
     };
@@ -195,7 +195,7 @@ pub(super) async fn beside(
     measured: &Variable,
     sampling: &Sampling,
 ) -> Result<Option<Coordinate>, Stop> {
-    let Some(steps) = steps(variable, measured, sampling) else {
+    let Some(steps) = steps(&variable.dimensions, measured, sampling) else {
         return Ok(None);
     };
     Ok(Some(Coordinate {
@@ -203,4 +203,18 @@ pub(super) async fn beside(
         values: read(session, variable).await?,
         steps,
     }))
+}
+
+/// Values along dimensions of the file as a coordinate of a measured variable; none if it does not have these.
+pub(super) fn along(
+    name: &str,
+    (dimensions, values): (&[Dimension], Vec<f64>),
+    measured: &Variable,
+    sampling: &Sampling,
+) -> Option<Coordinate> {
+    Some(Coordinate {
+        name: name.to_owned(),
+        values,
+        steps: steps(dimensions, measured, sampling)?,
+    })
 }

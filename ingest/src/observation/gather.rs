@@ -17,6 +17,9 @@ use crate::error::Rejection;
 pub(crate) const MAX_OBSERVATIONS: usize = 1 << 20;
 /// Memory of one observation with its texts, bytes.
 pub(crate) const OBSERVATION_BYTES: u64 = 300;
+/// Share of a number within which another says the same: some steps of float32, in which files keep one value in two units, by
+/// factors of six digits (knots of 0.514444 m/s).
+const SAME_SHARE: f64 = 1e-6;
 
 /// What was found in a file.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -37,6 +40,10 @@ pub(super) struct Gathered {
     out_of_range: u64,
     /// Values without a place or a time.
     unplaced: u64,
+    /// Values that do not count in the mode of their cast, where there is none that does.
+    superseded: u64,
+    /// Values of properties that several variables say different things of.
+    contradicted: u64,
     /// By property.
     tallies: BTreeMap<String, Tally>,
 }
@@ -95,6 +102,11 @@ impl Gathered {
         self.unplaced += 1;
     }
 
+    /// Counts a value that was taken back and that no other one took the place of.
+    pub(super) fn superseded(&mut self) {
+        self.superseded += 1;
+    }
+
     fn tally(&mut self, property: &str) -> &mut Tally {
         // Most observations are of a property that came before.
         if !self.tallies.contains_key(property) {
@@ -106,10 +118,18 @@ impl Gathered {
     }
 
     /// What was found. A file of which much cannot be true is refused, and one without any observation: `why` is the
-    /// reason if no value was found at all.
+    /// reason if no value was found at all. Properties of which two variables say different things are passed over.
     pub(super) fn finish(mut self, why: Rejection) -> Result<Found, Rejection> {
-        self.tell_apart()?;
-        let mut implausible = self.unplaced;
+        let contradictions = self.tell_apart();
+        if self.found.is_empty()
+            && let Some(first) = contradictions.first()
+        {
+            return Err(first.clone());
+        }
+        for rejection in &contradictions {
+            tracing::info!(%rejection, "a property is passed over");
+        }
+        let mut implausible = self.unplaced + self.contradicted;
         for (property, tally) in &self.tallies {
             let all = tally.taken + tally.implausible;
             if tally.implausible as f64 > MAX_IMPLAUSIBLE_SHARE * all as f64 {
@@ -123,8 +143,8 @@ impl Gathered {
         }
         let masked = MaskedCells {
             out_of_range: self.out_of_range,
+            poor_quality: self.superseded,
             implausible,
-            ..MaskedCells::default()
         };
         if self.found.is_empty() && !masked.is_none() {
             let detail = format!(
@@ -144,11 +164,9 @@ impl Gathered {
 
 impl Gathered {
     /// Leaves out, and counts, observations that a later one of the same name says something else than: one of the two is
-    /// wrong, and only one can be kept.
-    ///
-    /// # Errors
-    /// They are of two variables: nothing says which of these is meant.
-    fn tell_apart(&mut self) -> Result<(), Rejection> {
+    /// wrong, and only one can be kept. If they are of two variables, nothing says which of these is meant: all of their property
+    /// is left out and counted. Returns one contradiction of each such property.
+    fn tell_apart(&mut self) -> Vec<Rejection> {
         let mut order: Vec<usize> = (0..self.found.len()).collect();
         // Of one name the order of the file stays.
         order.sort_by(|a, b| by_name(&self.found[*a], &self.found[*b]));
@@ -160,18 +178,17 @@ impl Gathered {
             others.extend(same.iter().filter(is_other).map(|at| (*at, last)));
         }
         others.sort_unstable();
+        let mut contradictions: BTreeMap<String, Rejection> = BTreeMap::new();
         for (at, last) in &others {
             let (own, kept) = (&self.found[*at], &self.found[*last]);
             if let (Some(a), Some(b)) = (self.variable_of(*at), self.variable_of(*last))
                 && a != b
             {
-                let detail = format!(
-                    "are both {} and differ at the same time, place and depth ({:e} and {:e} {} on {}); leave one of them out, or \
-                     give it a standard name of its own",
-                    own.property, own.value, kept.value, own.unit, own.time
-                );
-                let object = format!("{a} and {b}");
-                return Err(Rejection::new(RejectReason::Corrupt, object, detail));
+                if !contradictions.contains_key(&own.property) {
+                    let rejection = contradiction((a, own), (b, kept));
+                    contradictions.insert(own.property.clone(), rejection);
+                }
+                continue;
             }
             let example = format!(
                 "two of {} on {} at {} m, {:e} and {:e} {}",
@@ -184,11 +201,15 @@ impl Gathered {
         }
         let mut at = 0;
         let mut left_out = others.into_iter().map(|(at, _)| at).peekable();
-        self.found.retain(|_| {
+        self.found.retain(|one| {
             at += 1;
-            left_out.next_if_eq(&(at - 1)).is_none()
+            left_out.next_if_eq(&(at - 1)).is_none() && !contradictions.contains_key(&one.property)
         });
-        Ok(())
+        for property in contradictions.keys() {
+            let tally = self.tallies.remove(property).unwrap_or_default();
+            self.contradicted += tally.taken + tally.implausible;
+        }
+        contradictions.into_values().collect()
     }
 
     /// The variable that an observation is of; none in a file that is no set of variables.
@@ -197,6 +218,16 @@ impl Gathered {
         let (_, name) = &self.variables[after.checked_sub(1)?];
         Some(name)
     }
+}
+
+/// What is wrong with two variables that say different things of one sample.
+fn contradiction((a, own): (&str, &Observation), (b, other): (&str, &Observation)) -> Rejection {
+    let detail = format!(
+        "are both {} and differ at the same time, place and depth ({:e} and {:e} {} on {}); leave one of them out, or \
+         give it a standard name of its own",
+        own.property, own.value, other.value, own.unit, own.time
+    );
+    Rejection::new(RejectReason::Corrupt, format!("{a} and {b}"), detail)
 }
 
 /// The order of the names of observations of one dataset.
@@ -210,10 +241,10 @@ fn by_name(a: &Observation, b: &Observation) -> Ordering {
         .then_with(by_platform)
 }
 
-/// Do two observations of one name differ in what they say?
+/// Do two observations of one name differ in what they say, by more than rounding?
 fn says_other(a: &Observation, b: &Observation) -> bool {
-    let said = |o: &Observation| [o.value, o.lon_deg, o.lat_deg].map(f64::to_bits);
-    said(a) != said(b)
+    let is_other = |a: f64, b: f64| (a - b).abs() > SAME_SHARE * a.abs().max(b.abs());
+    is_other(a.value, b.value) || is_other(a.lon_deg, b.lon_deg) || is_other(a.lat_deg, b.lat_deg)
 }
 
 impl Tally {
@@ -379,6 +410,46 @@ mod tests {
             refused.detail.contains("sea_surface_temperature"),
             "{refused}"
         );
+    }
+
+    #[test]
+    fn a_property_of_which_two_variables_say_different_things_is_left_out_alone() {
+        let mut gathered = Gathered::default();
+        for (variable, property, value) in [
+            ("air", "air_temperature", 280.0),
+            ("one", "sea_surface_temperature", 290.0),
+            ("other", "sea_surface_temperature", 290.5),
+        ] {
+            gathered.begin(variable);
+            for observation in hours(2) {
+                let property = property.to_owned();
+                gathered
+                    .take(Observation {
+                        property,
+                        value,
+                        ..observation
+                    })
+                    .unwrap();
+            }
+        }
+        let found = gathered.finish(why()).unwrap();
+        let is_air = |o: &Observation| o.property == "air_temperature";
+        assert!(found.observations.iter().all(is_air));
+        assert_eq!((found.observations.len(), found.masked.implausible), (2, 4));
+    }
+
+    #[test]
+    fn values_that_differ_by_rounding_say_the_same() {
+        let of = |value: f64, lon_deg: f64| Observation {
+            lon_deg,
+            ..sst(value, 10.0)
+        };
+        let own = of(285.5, 190.0);
+        assert!(!says_other(&own, &of(285.5 + 1e-4, 190.0)));
+        assert!(!says_other(&own, &of(f64::from(12.35_f32) + 273.15, 190.0)));
+        assert!(says_other(&own, &of(285.51, 190.0)));
+        assert!(says_other(&own, &of(285.5, 190.01)));
+        assert!(!says_other(&of(0.0, 0.0), &of(-0.0, 0.0)));
     }
 
     #[test]

@@ -18,6 +18,9 @@ use crate::plan::cf::calendar::{Calendar, TimeUnit};
 use crate::plan::method;
 use crate::plan::unit;
 
+/// Depth down to which ships take in and buoys meet what they call surface water; their sensors and hulls reach to 3 to 10 m.
+const SURFACE_M: f64 = 20.0;
+
 /// A measured variable with all that its samples need.
 pub(super) struct Measured<'a> {
     pub(super) variable: &'a Variable,
@@ -27,9 +30,11 @@ pub(super) struct Measured<'a> {
     pub(super) latitude: Coordinate,
     pub(super) longitude: Coordinate,
     pub(super) depth: Option<(Coordinate, ToDepth)>,
+    /// Are samples at depths of all kinds, so that nobody knows how deep one is whose depth is missing?
+    pub(super) is_of_depths: bool,
     pub(super) flags: Vec<(Coordinate, Scheme)>,
-    /// Mode of each cast of a float, where that says whether the variable counts.
-    pub(super) mode: Option<Coordinate>,
+    /// Mode of each cast of a float, where that says whether the variable counts, and the values that count where it does not.
+    pub(super) mode: Option<(Coordinate, Option<Coordinate>)>,
 }
 
 /// How a vertical coordinate becomes metres below the surface.
@@ -57,7 +62,7 @@ pub(super) fn is_candidate(file: &Description, variable: &Variable) -> bool {
     let is_remark = epic::code_of(variable).is_some_and(epic::is_remark)
         || attributes
             .text("standard_name")
-            .is_some_and(|name| name.ends_with("status_flag"))
+            .is_some_and(quality::is_flag_name)
         || [
             "flag_values",
             "flag_masks",
@@ -168,10 +173,12 @@ pub(super) async fn prepare<'a>(
         let detail = "has values at several depths, and nothing says which; give a depth in m, or sea_water_pressure in dbar";
         return refuse(RejectReason::NoVariable, detail.to_owned());
     }
-    let mode = match argo::mode(file, variable) {
-        Some(mode) => coordinate::beside(session, mode, variable, sampling).await?,
-        None => None,
+    let is_deep = |(coordinate, to): &(Coordinate, ToDepth)| {
+        is_by_level(variable, coordinate, &[&time, &latitude, &longitude])
+            || reaches_down(coordinate, *to)
     };
+    let is_of_depths = is_of_casts || depth.as_ref().is_some_and(is_deep);
+    let mode = mode(session, file, variable, sampling).await?;
     Ok(Ok(Measured {
         mode,
         conversion,
@@ -180,9 +187,29 @@ pub(super) async fn prepare<'a>(
         latitude,
         longitude,
         depth,
+        is_of_depths,
         flags: flags(session, file, variable, sampling).await?,
         variable,
     }))
+}
+
+/// The mode of each cast of a float and the values of the variable's twin, if it has one.
+async fn mode(
+    session: &mut Session,
+    file: &Description,
+    variable: &Variable,
+    sampling: &Sampling,
+) -> Result<Option<(Coordinate, Option<Coordinate>)>, Stop> {
+    let Some(twin) = argo::twin(file, variable) else {
+        return Ok(None);
+    };
+    let Some(modes) = argo::modes(session, file, variable).await? else {
+        return Ok(None);
+    };
+    let modes = (modes.dimensions.as_slice(), modes.values);
+    let mode = coordinate::along("the modes of casts", modes, variable, sampling);
+    let twin = coordinate::beside(session, twin, variable, sampling).await?;
+    Ok(mode.map(|mode| (mode, twin)))
 }
 
 /// Where the values of a variable are; measured places are at themselves.
@@ -232,6 +259,22 @@ fn has_levels(variable: &Variable, sampling: &Sampling, known: &[&Coordinate]) -
     })
 }
 
+/// Does a depth run along a dimension of its own, that neither times nor places run along?
+fn is_by_level(variable: &Variable, depth: &Coordinate, others: &[&Coordinate]) -> bool {
+    let mut dimensions = variable.dimensions.iter().enumerate();
+    dimensions.any(|(place, dimension)| {
+        dimension.len > 1
+            && depth.varies_along(place)
+            && !others.iter().any(|of| of.varies_along(place))
+    })
+}
+
+/// Is one of the depths of a coordinate beyond what ships and buoys measure "the surface" at: that of a glider or a diver?
+fn reaches_down(depth: &Coordinate, to: ToDepth) -> bool {
+    // Only casts have their depth by pressure, for which alone the latitude matters.
+    (depth.values.iter()).any(|number| to.depth_m(*number, 0.0) > SURFACE_M)
+}
+
 fn time_unit(file: &Description, name: &str) -> Result<TimeUnit, String> {
     let attributes = &file.variable(name).ok_or("is not in the file")?.attributes;
     let calendar = Calendar::parse(attributes.text("calendar"))?;
@@ -268,12 +311,15 @@ async fn depth(
     if found.is_none() && is_of_casts {
         found = coordinate::find(session, file, variable, sampling, Says::Pressure).await?;
     }
-    let Some(found) = found else {
+    let Some(mut found) = found else {
         return Ok(Ok(None));
     };
     let Some(vertical) = file.variable(&found.name) else {
         return Ok(Ok(None));
     };
+    if let Some(values) = argo::counting(session, file, vertical).await? {
+        found.values = values;
+    }
     Ok(match to_depth(vertical) {
         Ok(to) => Ok(Some((found, to))),
         Err(detail) => Err(Rejection::new(RejectReason::Unit, &found.name, detail)),

@@ -158,10 +158,6 @@ fn sample(
     gathered: &mut Gathered,
 ) -> Result<(), Rejection> {
     let at = |coordinate: &Coordinate| coordinate.at(cell, &shared.sampling);
-    let mode = measured.mode.as_ref().map(at);
-    if mode.is_some_and(|mode| !argo::counts(measured.variable, mode)) {
-        return Ok(());
-    }
     let verdicts = measured
         .flags
         .iter()
@@ -170,6 +166,14 @@ fn sample(
     let Some(quality) = verdict.unwrap_or(Some(Quality::NotEvaluated)) else {
         return Ok(());
     };
+    if let Some((mode, twin)) = &measured.mode
+        && !argo::counts(measured.variable, at(mode))
+    {
+        if twin.as_ref().is_none_or(|twin| at(twin).is_nan()) {
+            gathered.superseded();
+        }
+        return Ok(());
+    }
     let conversion = &measured.conversion;
     let value = match number {
         Unpacked::Value(number) => conversion.given(number),
@@ -226,7 +230,7 @@ struct Place {
 
 impl Place {
     /// That of a cell; none where the file leaves a part of it open. Without a word of depths samples are at the surface, as are
-    /// those whose property says so.
+    /// those whose property says so, and those without a depth among others at the surface.
     fn of(
         measured: &Measured<'_>,
         sampling: &Sampling,
@@ -237,7 +241,9 @@ impl Place {
         let (lon_deg, lat_deg) = (at(&measured.longitude), at(&measured.latitude));
         let said = measured.depth.as_ref();
         let mut depth_m = said.map_or(0.0, |(depth, to)| to.depth_m(at(depth), lat_deg));
-        if depth_m.is_nan() && is_of_surface(&measured.conversion.property) {
+        let is_at_surface =
+            || !measured.is_of_depths || is_of_surface(&measured.conversion.property);
+        if depth_m.is_nan() && is_at_surface() {
             depth_m = 0.0;
         }
         if [time, lon_deg, lat_deg, depth_m].iter().any(|n| n.is_nan()) {

@@ -5,7 +5,7 @@
 
 use contract::observation::Quality;
 
-use crate::inspect::file::description::Variable;
+use crate::inspect::file::description::{Kind, Variable};
 use crate::plan::cf::flag::{self, Flag};
 
 /// What a flag says: a quality, or that there is no value.
@@ -27,8 +27,8 @@ pub(super) enum Scheme {
 }
 
 impl Scheme {
-    /// The scheme of a CF status-flag variable, from `flag_values`, `flag_masks` and `flag_meanings`. Bits without meanings
-    /// say nothing.
+    /// The scheme of a CF status-flag variable, from `flag_values`, `flag_masks` and `flag_meanings`, or its name. Bits without
+    /// meanings say nothing.
     pub(super) fn of(variable: &Variable) -> Self {
         if variable.attributes.0.contains_key("flag_masks") {
             let flags = flag::of(variable).unwrap_or_default();
@@ -45,6 +45,7 @@ impl Scheme {
                 let words = meanings.split_whitespace();
                 Self::Stated(values.into_iter().zip(words.map(meaning)).collect())
             }
+            _ if is_of_woce(&variable.name) => Self::Woce,
             _ => Self::Primary,
         }
     }
@@ -80,23 +81,82 @@ impl Scheme {
     }
 }
 
-/// Does a variable that another one names as ancillary speak of its quality? Errors, counts of samples and other numbers
-/// are ancillary too.
+/// Does a variable that another one names as ancillary speak of its quality? Errors, counts of samples, instruments and other
+/// numbers are ancillary too.
 pub(super) fn is_flag(variable: &Variable) -> bool {
-    if let Some(name) = variable.attributes.text("standard_name") {
-        return name.ends_with("status_flag")
-            || matches!(name, "quality_flag" | "aggregate_quality_flag");
+    let has = |name: &str| variable.attributes.0.contains_key(name);
+    let is_stated = has("flag_values") || has("flag_masks");
+    let standard_name = variable.attributes.text("standard_name");
+    if let Some(name) = standard_name.filter(|name| !name.is_empty()) {
+        return is_flag_name(name) || name.ends_with("quality_flag") && is_stated;
     }
+    is_stated || is_called_flag(&variable.name) || is_nameless_flag(variable)
+}
+
+/// Is a standard name one of flags of a scheme? Those of single tests mean what they say themselves alone.
+pub(super) fn is_flag_name(standard_name: &str) -> bool {
+    standard_name.ends_with("status_flag")
+        || matches!(standard_name, "quality_flag" | "aggregate_quality_flag")
+}
+
+fn is_called_flag(name: &str) -> bool {
+    let name = name.to_ascii_lowercase();
+    let ends = ["_qc", "_flag", "_flags", "_qf"];
+    name.starts_with("qc_") || ends.iter().any(|end| name.ends_with(end))
+}
+
+/// Is a variable without a standard name a flag, by what it holds: codes of samples, in whole numbers or letters, whose name speaks
+/// of nothing else?
+fn is_nameless_flag(variable: &Variable) -> bool {
+    /// Parts of names of other things; levels of quality go up with it, where flags go down, and count if their meanings are given.
+    const OTHERS: [&str; 18] = [
+        "calib",
+        "confidence",
+        "count",
+        "deviation",
+        "error",
+        "instrument",
+        "level",
+        "method",
+        "number",
+        "percent",
+        "platform",
+        "sample",
+        "sensor",
+        "serial",
+        "spread",
+        "station",
+        "uncertain",
+        "varian",
+    ];
+    /// Words that are short of them.
+    const SHORT: [&str; 11] = [
+        "err", "id", "n", "nobs", "num", "obs", "sd", "se", "std", "stddev", "stdev",
+    ];
+    let is_whole = match variable.kind {
+        Kind::Integer(_) | Kind::Unsigned(_) | Kind::Text(1) => true,
+        Kind::Float(_) | Kind::Text(_) | Kind::Other => false,
+    };
+    let packed = ["scale_factor", "add_offset"];
+    let is_packed = (packed.iter()).any(|name| variable.attributes.0.contains_key(*name));
+    let unit = variable.attributes.text("units").unwrap_or_default();
     let name = variable.name.to_ascii_lowercase();
-    let is_named = name.starts_with("qc_")
-        || ["_qc", "_flag", "_qf"]
-            .iter()
-            .any(|end| name.ends_with(end));
-    let states = ["flag_values", "flag_masks"];
-    is_named
-        || states
-            .iter()
-            .any(|name| variable.attributes.0.contains_key(*name))
+    let is_short =
+        |word: &str| SHORT.contains(&word.trim_end_matches(|c: char| c.is_ascii_digit()));
+    let is_other = OTHERS.iter().any(|other| name.contains(other))
+        || name.split(['_', '-', '.']).any(is_short);
+    is_whole
+        && !is_packed
+        && !variable.dimensions.is_empty()
+        && matches!(unit, "" | "1")
+        && !is_other
+}
+
+/// Does a variable say by its name that its flags are those of WOCE?
+fn is_of_woce(name: &str) -> bool {
+    name.to_ascii_lowercase()
+        .split('_')
+        .any(|word| word == "woce")
 }
 
 /// The worse of two verdicts; no value is the worst.
@@ -139,7 +199,7 @@ fn meaning(word: &str) -> Verdict {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::inspect::file::description::{AttributeValue, Kind};
+    use crate::inspect::file::description::{AttributeValue, Dimension};
     use Quality::{Bad, Good, NotEvaluated, Questionable};
 
     #[test]
@@ -177,7 +237,10 @@ mod tests {
         let own = |(name, value): &(&str, AttributeValue)| ((*name).to_owned(), value.clone());
         Variable {
             name: name.to_owned(),
-            dimensions: vec![],
+            dimensions: vec![Dimension {
+                name: Some("time".to_owned()),
+                len: 3,
+            }],
             kind: Kind::Integer(1),
             attributes: attributes.iter().map(own).collect(),
         }
@@ -219,14 +282,69 @@ mod tests {
         assert!(is_flag(&named("sea_water_temperature status_flag")));
         assert!(is_flag(&named("aggregate_quality_flag")));
         assert!(!is_flag(&named("sea_water_temperature standard_error")));
-        let kind = Kind::Integer(1);
-        let bits = vec![1.0_f64.into()];
-        let states = AttributeValue::Numbers { kind, bits };
-        assert!(is_flag(&variable("state", &[("flag_values", states)])));
-        assert!(is_flag(&variable("TEMP_QC", &[])));
-        for name in ["temp_uncertainty", "temp_count", "temp_std"] {
+        let stated = || {
+            let kind = Kind::Integer(1);
+            let bits = vec![1.0_f64.into()];
+            ("flag_values", AttributeValue::Numbers { kind, bits })
+        };
+        assert!(is_flag(&variable("state", &[stated()])));
+        for name in [
+            "TEMP_QC",
+            "temp_quality_control",
+            "temp_quality",
+            "temp_flags",
+            "TEMP_WOCE",
+        ] {
+            assert!(is_flag(&variable(name, &[])), "{name}");
+        }
+        for name in [
+            "temp_uncertainty",
+            "temp_count",
+            "temp_std",
+            "n_obs",
+            "number_of_samples",
+            "instrument1",
+            "sst_quality_level",
+        ] {
             assert!(!is_flag(&variable(name, &[])), "{name}");
         }
+        // Levels of quality say themselves what is good.
+        assert!(is_flag(&variable("sst_quality_level", &[stated()])));
+        let of_a_test = || AttributeValue::Text("spike_test_quality_flag".to_owned());
+        let name = ("standard_name", of_a_test());
+        assert!(is_flag(&variable("beside", &[name, stated()])));
+        assert!(!is_flag(&variable(
+            "beside",
+            &[("standard_name", of_a_test())]
+        )));
+    }
+
+    #[test]
+    fn numbers_with_units_or_fractions_and_lone_ones_are_no_flags() {
+        let plain = || variable("temp_quality", &[]);
+        let unit = |unit: &str| {
+            let text = AttributeValue::Text(unit.to_owned());
+            variable("temp_quality", &[("units", text)])
+        };
+        assert!(is_flag(&unit("1")) && !is_flag(&unit("%")));
+        assert!(!is_flag(&Variable {
+            kind: Kind::Float(4),
+            ..plain()
+        }));
+        assert!(!is_flag(&Variable {
+            dimensions: vec![],
+            ..plain()
+        }));
+        assert!(is_flag(&Variable {
+            kind: Kind::Text(1),
+            ..plain()
+        }));
+    }
+
+    #[test]
+    fn flags_that_are_called_those_of_woce_are_of_its_scheme() {
+        assert_eq!(Scheme::of(&variable("TEMP_WOCE", &[])), Scheme::Woce);
+        assert_eq!(Scheme::of(&variable("temp_qc", &[])), Scheme::Primary);
     }
 
     #[test]

@@ -69,6 +69,7 @@ pub(super) fn period(
 }
 
 /// The period of a stated length where the coverage says the same, or lies within it; the coverage where it is as long and lies elsewhere.
+/// Whether days end with their year the coverage says.
 ///
 /// # Errors
 /// They are of different lengths: what is stated may be how far values are apart, or the coverage that of a larger file.
@@ -77,10 +78,17 @@ fn agreed(
     covers: Covers,
     (start, end): (TimeMs, TimeMs),
 ) -> Result<Period, Rejection> {
-    let stated = from_start(covers, start)?;
     let (whole, _) = whole_days(start, end)?;
     let length_ms = |period: Period| period.end.ms() - period.start.ms();
-    let off_ms = (length_ms(stated) / SAME_STEP).clamp(ORBITS_MS, DAY_MS);
+    let allowed_ms = |step: Period| (length_ms(step) / SAME_STEP).clamp(ORBITS_MS, DAY_MS);
+    let off_end_ms = |step: Period| (whole.end.ms() - step.end.ms()).abs();
+    let cut = from_start(covers, start)?;
+    let over_new_year = covers.period_over_new_year(date::of_instant(first_of(start)));
+    let stated = over_new_year
+        .ok()
+        .filter(|step| off_end_ms(*step) <= allowed_ms(*step).min(off_end_ms(cut)))
+        .unwrap_or(cut);
+    let off_ms = allowed_ms(stated);
     let early_ms = stated.start.ms() - whole.start.ms();
     let late_ms = whole.end.ms() - stated.end.ms();
     let is_long = length_ms(stated) <= DAY_MS || 2 * length_ms(whole) >= length_ms(stated);
@@ -109,12 +117,16 @@ fn agreed(
 
 /// The period of a stated length from the start of the coverage on.
 fn from_start(covers: Covers, start: TimeMs) -> Result<Period, Rejection> {
-    let start = match nearest_midnight(start) {
+    let period = covers.period(date::of_instant(first_of(start)));
+    period.map_err(|e| refused("time_coverage_start", e))
+}
+
+/// The midnight that the start of a coverage of orbits is near to, else the start itself.
+fn first_of(start: TimeMs) -> TimeMs {
+    match nearest_midnight(start) {
         Some((midnight, off_ms)) if off_ms <= ORBITS_MS => midnight,
         _ => start,
-    };
-    let period = covers.period(date::of_instant(start));
-    period.map_err(|e| refused("time_coverage_start", e))
+    }
 }
 
 /// The period of a stated length: a month or year that holds the stamp, days from the start of the coverage.

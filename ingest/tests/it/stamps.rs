@@ -428,6 +428,31 @@ async fn a_stated_length_and_the_coverage_must_agree() {
     assert_eq!(told(&file(15.0, "P1M", days), None).await, (month, vec![]));
 }
 
+/// Of composites of eight days some are counted anew with each year, others run on.
+#[tokio::test]
+async fn the_coverage_says_whether_a_composite_ends_with_its_year() {
+    let file = |end: &'static str| {
+        MadeFile::sst(1)
+            .numbers("time", &[360.0])
+            .text("time_coverage_resolution", "P8D")
+            .text("time_coverage_start", "2001-12-27T00:00:00Z")
+            .text("time_coverage_end", end)
+    };
+    for end in [
+        "2002-01-04T00:00:00Z",
+        "2002-01-03T23:59:59Z",
+        "2002-01-03T00:00:00Z",
+    ] {
+        let running = vec![period("2001-12-27", "2002-01-04")];
+        assert_eq!(told(&file(end), None).await, (running, vec![]), "{end}");
+    }
+    for end in ["2002-01-01T00:00:00Z", "2001-12-31T23:59:59Z"] {
+        let (periods, assumptions) = told(&file(end), None).await;
+        assert_eq!(periods, [period("2001-12-27", "2002-01-01")], "{end}");
+        assert!(assumptions[0].contains("ends with its year"), "{end}");
+    }
+}
+
 /// A map of a forecast has two times of one number each.
 #[tokio::test]
 async fn when_a_forecast_was_begun_is_no_time_of_its_values() {

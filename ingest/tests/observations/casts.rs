@@ -1,7 +1,7 @@
 //! Casts: whose they are, and how deep each of their samples is.
 
 use contract::event::RejectReason;
-use contract::observation::Quality;
+use contract::observation::{Observation, Quality};
 
 use crate::made::{Draft, SST, observations, read, refusal, seen, settings};
 
@@ -166,6 +166,38 @@ async fn a_sample_whose_depth_is_not_said_is_counted_and_left_out() {
     assert_eq!((depths, masked.implausible), (vec![1.0, 1.0, 2.0], 1));
 }
 
+/// Depths and counted losses of what a ship, or another that goes along a way, measured twice; the second depth is missing.
+async fn along_a_way(first_m: f64) -> (Vec<(String, f64)>, u64) {
+    let folder = tempfile::tempdir().unwrap();
+    let fugacity = [
+        ("standard_name", "fugacity_of_carbon_dioxide_in_sea_water"),
+        ("units", "uatm"),
+    ];
+    let wind = [("standard_name", "wind_speed"), ("units", "m s-1")];
+    let file = Draft::new("trajectory", &[("obs", 2)])
+        .axes("obs", "obs", 2, 2)
+        .variable("depth", &["obs"], DEPTH, vec![first_m, f64::NAN])
+        .variable("fco2", &["obs"], &fugacity, vec![380.0, 381.0])
+        .variable("wind", &["obs"], &wind, vec![5.0, 6.0])
+        .write(folder.path());
+    let (found, masked) = read(&file, &settings()).await.unwrap();
+    let own = |o: Observation| (o.property, o.depth_m);
+    (found.into_iter().map(own).collect(), masked.implausible)
+}
+
+#[tokio::test]
+async fn a_sample_of_the_surface_without_a_depth_is_kept_and_one_of_a_glider_is_counted() {
+    let (found, lost) = along_a_way(5.0).await;
+    let (fugacity, wind) = ("fugacity_of_carbon_dioxide_in_sea_water", "wind_speed");
+    let expected = [(fugacity, 5.0), (fugacity, 0.0), (wind, 5.0), (wind, 0.0)];
+    let expected = expected.map(|(property, depth_m)| (property.to_owned(), depth_m));
+    assert_eq!((found, lost), (expected.to_vec(), 0));
+    let (found, lost) = along_a_way(300.0).await;
+    assert_eq!((found.len(), lost), (2, 2));
+    let is_deep = |(_, depth_m): &(String, f64)| (depth_m - 300.0).abs() < 1e-9;
+    assert!(found.iter().all(is_deep), "{found:?}");
+}
+
 #[tokio::test]
 async fn flags_may_be_letters() {
     let folder = tempfile::tempdir().unwrap();
@@ -209,17 +241,86 @@ async fn of_a_float_the_adjusted_values_count_once_there_are_any() {
             vec![fill, fill, 23.0, fill],
         )
         .write(folder.path());
-    let found = observations(&file).await;
+    let (found, masked) = read(&file, &settings()).await.unwrap();
     let expected = [
         ("11".to_owned(), 1, 100, 11),
         ("11".to_owned(), 1, 100, 12),
         ("22".to_owned(), 2, -160, 23),
     ];
     assert_eq!(seen(&found), expected);
+    assert_eq!(masked.poor_quality, 1, "what came was found to be bad");
     let adjusted = found.iter().find(|o| o.platform == "22").unwrap();
     assert!(
         (adjusted.depth_m - 4.9725).abs() < 1e-3,
         "{}",
         adjusted.depth_m
     );
+}
+
+/// A cast of a float whose pressure is as it came and whose oxygen is adjusted, and one of which it is the other way round.
+fn oxygen() -> Draft {
+    let shape = ["N_PROF", "N_LEVELS"];
+    let pressure = [
+        ("standard_name", "sea_water_pressure"),
+        ("units", "decibar"),
+        ("axis", "Z"),
+    ];
+    let doxy = [
+        (
+            "standard_name",
+            "moles_of_oxygen_per_unit_mass_in_sea_water",
+        ),
+        ("units", "micromole/kg"),
+    ];
+    let fill = f64::NAN;
+    let sizes = [
+        ("N_PROF", 2),
+        ("N_LEVELS", 2),
+        ("N_PARAM", 2),
+        ("STRING8", 8),
+        ("STRING2", 2),
+    ];
+    Draft::new("trajectoryProfile", &sizes)
+        .letters("PLATFORM_NUMBER", &["N_PROF", "STRING2"], &[], "1122")
+        .letters(
+            "STATION_PARAMETERS",
+            &["N_PROF", "N_PARAM", "STRING8"],
+            &[],
+            "PRES    DOXY    DOXY    PRES    ",
+        )
+        .letters("PARAMETER_DATA_MODE", &["N_PROF", "N_PARAM"], &[], "RARD")
+        .axes("N_PROF", "N_PROF", 2, 2)
+        .variable("PRES", &shape, &pressure, vec![0.0, 10.0, 0.0, 10.0])
+        .variable(
+            "PRES_ADJUSTED",
+            &shape,
+            &pressure,
+            vec![fill, fill, 5.0, 15.0],
+        )
+        .variable("DOXY", &shape, &doxy, vec![201.0, 202.0, 203.0, 204.0])
+        .variable(
+            "DOXY_ADJUSTED",
+            &shape,
+            &doxy,
+            vec![211.0, fill, fill, fill],
+        )
+}
+
+#[tokio::test]
+async fn each_parameter_of_a_float_counts_by_its_own_mode() {
+    // Files of one kind of float have the mode of their most adjusted parameter too, synthetic ones do not.
+    for draft in [
+        oxygen(),
+        oxygen().letters("DATA_MODE", &["N_PROF"], &[], "AD"),
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        let file = draft.write(folder.path());
+        let (mut found, masked) = read(&file, &settings()).await.unwrap();
+        found.sort_by(|a, b| a.value.total_cmp(&b.value));
+        let depths: Vec<i64> = found.iter().map(|o| o.depth_m.round() as i64).collect();
+        let platforms: Vec<&str> = found.iter().map(|o| o.platform.as_str()).collect();
+        assert_eq!(platforms, ["22", "22", "11"]);
+        assert_eq!(depths, [5, 15, 0]);
+        assert_eq!((masked.poor_quality, masked.implausible), (1, 0));
+    }
 }

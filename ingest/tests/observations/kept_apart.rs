@@ -2,7 +2,7 @@
 
 use contract::observation::{Observation, Quality};
 
-use crate::made::{Draft, SST, observations, refusal, seen};
+use crate::made::{Draft, SST, observations, read, refusal, seen, settings};
 
 /// One buoy with three hours of temperatures.
 fn buoy(attributes: &[(&str, &str)]) -> Draft {
@@ -34,6 +34,25 @@ async fn errors_and_counts_beside_a_variable_are_no_flags_of_it() {
     );
     let qualities: Vec<Quality> = of(flagged).await.iter().map(|o| o.quality).collect();
     assert_eq!(qualities, [Quality::Bad, Quality::Good]);
+}
+
+#[tokio::test]
+async fn flags_of_many_names_are_read_and_what_is_bad_is_bad() {
+    for name in [
+        "sst_quality_control",
+        "sst_quality",
+        "sst_flags",
+        "SST_SEADATANET",
+    ] {
+        let draft = buoy(&[("ancillary_variables", name)]).letters(name, &["time"], &[], "134");
+        let qualities: Vec<Quality> = of(draft).await.iter().map(|o| o.quality).collect();
+        let expected = [Quality::Good, Quality::Questionable, Quality::Bad];
+        assert_eq!(qualities, expected, "{name}");
+    }
+    let draft = buoy(&[("ancillary_variables", "SST_WOCE")]);
+    let draft = draft.letters("SST_WOCE", &["time"], &[], "249");
+    let qualities: Vec<Quality> = of(draft).await.iter().map(|o| o.quality).collect();
+    assert_eq!(qualities, [Quality::Good, Quality::Bad], "9 is missing");
 }
 
 #[tokio::test]
@@ -76,6 +95,34 @@ async fn two_variables_of_one_name_that_differ_are_refused_with_both() {
     // Those that say the same do not contradict each other.
     let same = buoy(&[]).variable("sst_2", &["time"], SST, vec![11.0, f64::NAN, 13.0]);
     assert_eq!(of(same).await.len(), 5);
+}
+
+#[tokio::test]
+async fn one_value_in_two_units_is_one_and_a_second_sensor_loses_its_property_alone() {
+    let kelvin = [
+        ("standard_name", "sea_surface_temperature"),
+        ("units", "K"),
+        ("coordinates", "time lat lon"),
+    ];
+    let rounded = |celsius: f64| f64::from((celsius + 273.15) as f32);
+    let values = [11.0, 12.0, 13.0].map(rounded).to_vec();
+    let found = of(buoy(&[]).variable("sst_k", &["time"], &kelvin, values)).await;
+    let values: Vec<i64> = seen(&found).iter().map(|row| row.3).collect();
+    assert_eq!(values, [11, 11, 12, 12, 13, 13]);
+    let air = [
+        ("standard_name", "air_temperature"),
+        ("units", "K"),
+        ("coordinates", "time lat lon"),
+    ];
+    let folder = tempfile::tempdir().unwrap();
+    let draft = buoy(&[])
+        .variable("sst_2", &["time"], SST, vec![11.0, 12.5, 13.0])
+        .variable("air", &["time"], &air, vec![280.0; 3]);
+    let (found, masked) = read(&draft.write(folder.path()), &settings())
+        .await
+        .unwrap();
+    assert!(found.iter().all(|o| o.property == "air_temperature"));
+    assert_eq!((found.len(), masked.implausible), (3, 6));
 }
 
 /// Two samples of one instant at two places, and one of a later one.

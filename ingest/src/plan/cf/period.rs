@@ -66,6 +66,11 @@ impl Covers {
         self.period_at(stamp, None)
     }
 
+    /// The same, but days go on over New Year.
+    pub(crate) fn period_over_new_year(self, stamp: CalendarDate) -> Result<Period, String> {
+        self.step(stamp, None, false)
+    }
+
     /// The period of this length in which a stamp stands where it is said.
     pub(crate) fn period_at(
         self,
