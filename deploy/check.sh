@@ -80,6 +80,8 @@ check_compose() {
     refused 'docker compose config' restrat compose "$work/compose.yaml" --quiet
     sed 's/"127\.0\.0\.1:/"/' compose.yaml >"$work/compose.yaml"
     refused 'the compose file rules' 'to more than this machine' compose_rules "$work/compose.yaml"
+    sed '/TMPDIR:/d' compose.yaml >"$work/compose.yaml"
+    refused 'the compose file rules' 'spools large fields in /tmp' compose_rules "$work/compose.yaml"
 }
 
 check_prometheus() {

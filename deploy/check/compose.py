@@ -4,6 +4,18 @@ import json
 import sys
 
 
+def spool_faults(service: dict) -> list[str]:
+    """What is wrong with where files lie that are on their way to the store: a volume, which is a disk, and not /tmp, which is memory."""
+    environment = service.get("environment") or {}
+    if "FLUXGLOBE_STORE" not in environment:
+        return []
+    folder = environment.get("TMPDIR") or "/tmp"
+    volumes = [volume["target"] for volume in service.get("volumes", []) if volume["type"] == "volume"]
+    if any(folder == volume or folder.startswith(f"{volume}/") for volume in volumes):
+        return []
+    return [f"spools large fields in {folder}, which is no volume"]
+
+
 def faults(name: str, service: dict) -> list[str]:
     """What is wrong with one service."""
     found = []
@@ -20,6 +32,7 @@ def faults(name: str, service: dict) -> list[str]:
         found.append("has no health check")
     if service["image"].startswith("fluxglobe:") and not service.get("read_only"):
         found.append("has a writable root file system")
+    found += spool_faults(service)
     return [f"{name} {fault}" for fault in found]
 
 
