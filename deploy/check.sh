@@ -80,6 +80,10 @@ check_compose() {
     refused 'docker compose config' restrat compose "$work/compose.yaml" --quiet
     sed 's/"127\.0\.0\.1:/"/' compose.yaml >"$work/compose.yaml"
     refused 'the compose file rules' 'to more than this machine' compose_rules "$work/compose.yaml"
+    sed '/EXECUTOR_MEMORY_BYTES:/d' compose.yaml >"$work/compose.yaml"
+    refused 'the compose file rules' 'executor may hold 8589934592 bytes' compose_rules "$work/compose.yaml"
+    sed '/3.3 GiB/,/memory:/s/memory: 4g/memory: 2g/' compose.yaml >"$work/compose.yaml"
+    refused 'the compose file rules' 'tile-server may hold' compose_rules "$work/compose.yaml"
     sed '/TMPDIR:/d' compose.yaml >"$work/compose.yaml"
     refused 'the compose file rules' 'spools large fields in /tmp' compose_rules "$work/compose.yaml"
 }
