@@ -139,6 +139,10 @@ check_chart() {
     refused 'the values schema' /kafka/security helm lint --kube-version 1.37.0 --set kafka.security=none helm/fluxglobe
     refused 'the values schema' /postgis/url \
         helm lint --kube-version 1.37.0 --set postgis.url=postgres://me:secret@host/database helm/fluxglobe
+    checked 'tile servers are told who asks' tells_clients "$work/1.37-everything.yaml"
+    refused 'the look for FLUXGLOBE_CLIENT_HEADER' 'all are one client' tells_clients "$work/1.37-values.yaml"
+    refused 'the chart' 'believed from whoever connects' \
+        helm template test helm/fluxglobe --kube-version 1.37.0 --set tileServer.clientHeader=x-forwarded-for
     checked 'workers on a GPU refuse to draw without it' requires_gpu "$work/1.37-everything.yaml"
     helm template test helm/fluxglobe --kube-version 1.37.0 --set renderWorker.gpu.enabled=false >"$work/no-gpu.yaml"
     refused 'the look for FLUXGLOBE_REQUIRE_GPU' 'no worker' requires_gpu "$work/no-gpu.yaml"
@@ -146,6 +150,10 @@ check_chart() {
     refused kubeconform formulae schemas_of 1.37 "$work/fault.yaml"
     sed 's/runAsNonRoot: true/runAsNonRoot: "yes"/' "$work/1.37-everything.yaml" >"$work/fault.yaml"
     refused kubeconform runAsNonRoot schemas_of 1.37 "$work/fault.yaml"
+}
+
+tells_clients() {
+    grep --quiet 'name: FLUXGLOBE_CLIENT_HEADER, value: "x-forwarded-for"' "$1" || { echo 'all are one client' && return 1; }
 }
 
 requires_gpu() { grep --quiet 'name: FLUXGLOBE_REQUIRE_GPU, value: "true"' "$1" || { echo 'no worker requires a GPU' && return 1; }; }
