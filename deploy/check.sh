@@ -46,8 +46,22 @@ check_shell() {
     local scripts
     mapfile -t scripts < <(git ls-files '*.sh' | sed 's|^|./|')
     checked "shellcheck of ${#scripts[@]} scripts" "$tools/bin/shellcheck" --external-sources --source-path=SCRIPTDIR --source-path=.. "${scripts[@]}"
+    checked 'cluster.sh env leads to the program' leads_to_program
+    refused 'the look for the program' 'is not found' leads_to_program 'export PATH='
     printf '%s\n' '#!/bin/bash' "rm -r \$1" >"$work/fault.sh"
     refused shellcheck SC2086 "$tools/bin/shellcheck" "$work/fault.sh"
+}
+
+# leads_to_program [WITHOUT]: is the program found after `eval` of the settings, of which lines with a text are left out?
+leads_to_program() {
+    local found
+    mkdir -p "$work/built"
+    install -m 755 /dev/null "$work/built/fluxglobe"
+    # FLUXGLOBE_RUN: nothing of a cluster that runs is looked at.
+    found=$(FLUXGLOBE_PROGRAM=$work/built/fluxglobe FLUXGLOBE_RUN=$work ./cluster.sh env | grep --invert-match "${1:-no text}")
+    # In a shell that has nothing but the system's programs.
+    found=$(PATH=/usr/bin:/bin && eval "$found" && command -v fluxglobe || true)
+    [ "$found" = "$work/built/fluxglobe" ] || { echo 'the program is not found' && return 1; }
 }
 
 check_node() {
