@@ -185,6 +185,8 @@ check_unit() {
     refused 'the look at a unit'"'"'s secrets' FLUXGLOBE_KAFKA_PASSWORD_FILE "$tools/bin/python" -B check/unit.py "$work/fluxglobe@.service"
     sed '/^User=/d' fluxglobe@.service >"$work/fluxglobe@.service"
     refused 'the look at a unit'"'"'s user' 'one user for all services' "$tools/bin/python" -B check/unit.py "$work/fluxglobe@.service"
+    sed 's/^User=.*/DynamicUser=yes/' fluxglobe.service >"$work/fluxglobe.service"
+    refused 'the look at a unit'"'"'s user' 'no user that can land files' "$tools/bin/python" -B check/unit.py "$work/fluxglobe.service"
     sed '/^StartLimitIntervalSec=/d' fluxglobe@.service >"$work/fluxglobe@.service"
     refused 'the look at a unit'"'"'s starts' 'gives up' "$tools/bin/python" -B check/unit.py "$work/fluxglobe@.service"
     if ! command -v systemd-analyze >/dev/null; then
