@@ -9,7 +9,8 @@ const FIRST: [&str; 3] = ["manifests", "observation-indexes", "manifest-pages"];
 
 fn land(data: &Path, month: usize) {
     let file = granule::write(data, month, 0).unwrap();
-    program::succeed(data, &["ingest", file.to_str().unwrap()]).unwrap();
+    let words = ["ingest", file.to_str().unwrap(), "--product", "flux"];
+    program::succeed(data, &words).unwrap();
 }
 
 /// Copies what is not there yet of a folder, if it is there, as tools that copy buckets do.
@@ -65,6 +66,6 @@ fn a_store_that_is_copied_while_a_file_lands_is_whole_if_manifests_were_copied_f
     assert!(lacks.contains("is missing"), "it tests nothing: {lacks}");
     let products = program::json(right, &["products", "--json"]).unwrap();
     let mut products = products.as_array().unwrap().iter();
-    let flux = products.find(|it| it["product"] == "fgco2").unwrap();
+    let flux = products.find(|it| it["product"] == "flux").unwrap();
     assert_eq!(flux["step_count"], 1, "the version that was there at first");
 }

@@ -349,7 +349,7 @@ mod tests {
     /// Is a picture of so many bytes found in a memory of so many, by whatever digest?
     fn is_remembered(picture_bytes: usize, memory_bytes: u64) -> bool {
         let memory = memory_of(memory_bytes);
-        let picture = Bytes::from(vec![0; picture_bytes]);
+        let picture = Bytes::from(vec![0_u8; picture_bytes]);
         (0..16_u8).all(|view| {
             let digest = Digest::of(&[view]);
             memory.insert(digest, picture.clone());
