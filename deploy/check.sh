@@ -46,8 +46,22 @@ check_shell() {
     local scripts
     mapfile -t scripts < <(git ls-files '*.sh' | sed 's|^|./|')
     checked "shellcheck of ${#scripts[@]} scripts" "$tools/bin/shellcheck" --external-sources --source-path=SCRIPTDIR --source-path=.. "${scripts[@]}"
+    checked 'cluster.sh env leads to the program' leads_to_program
+    refused 'the look for the program' 'is not found' leads_to_program 'export PATH='
     printf '%s\n' '#!/bin/bash' "rm -r \$1" >"$work/fault.sh"
     refused shellcheck SC2086 "$tools/bin/shellcheck" "$work/fault.sh"
+}
+
+# leads_to_program [WITHOUT]: is the program found after `eval` of the settings, of which lines with a text are left out?
+leads_to_program() {
+    local found
+    mkdir -p "$work/built"
+    install -m 755 /dev/null "$work/built/fluxglobe"
+    # FLUXGLOBE_RUN: nothing of a cluster that runs is looked at.
+    found=$(FLUXGLOBE_PROGRAM=$work/built/fluxglobe FLUXGLOBE_RUN=$work ./cluster.sh env | grep --invert-match "${1:-no text}")
+    # In a shell that has nothing but the system's programs.
+    found=$(PATH=/usr/bin:/bin && eval "$found" && command -v fluxglobe || true)
+    [ "$found" = "$work/built/fluxglobe" ] || { echo 'the program is not found' && return 1; }
 }
 
 check_node() {
@@ -80,6 +94,12 @@ check_compose() {
     refused 'docker compose config' restrat compose "$work/compose.yaml" --quiet
     sed 's/"127\.0\.0\.1:/"/' compose.yaml >"$work/compose.yaml"
     refused 'the compose file rules' 'to more than this machine' compose_rules "$work/compose.yaml"
+    sed '/EXECUTOR_MEMORY_BYTES:/d' compose.yaml >"$work/compose.yaml"
+    refused 'the compose file rules' 'executor may hold 8589934592 bytes' compose_rules "$work/compose.yaml"
+    sed '/3.3 GiB/,/memory:/s/memory: 4g/memory: 2g/' compose.yaml >"$work/compose.yaml"
+    refused 'the compose file rules' 'tile-server may hold' compose_rules "$work/compose.yaml"
+    sed '/TMPDIR:/d' compose.yaml >"$work/compose.yaml"
+    refused 'the compose file rules' 'spools large fields in /tmp' compose_rules "$work/compose.yaml"
 }
 
 check_prometheus() {
@@ -133,6 +153,10 @@ check_chart() {
     refused 'the values schema' /kafka/security helm lint --kube-version 1.37.0 --set kafka.security=none helm/fluxglobe
     refused 'the values schema' /postgis/url \
         helm lint --kube-version 1.37.0 --set postgis.url=postgres://me:secret@host/database helm/fluxglobe
+    checked 'tile servers are told who asks' tells_clients "$work/1.37-everything.yaml"
+    refused 'the look for FLUXGLOBE_CLIENT_HEADER' 'all are one client' tells_clients "$work/1.37-values.yaml"
+    refused 'the chart' 'believed from whoever connects' \
+        helm template test helm/fluxglobe --kube-version 1.37.0 --set tileServer.clientHeader=x-forwarded-for
     checked 'workers on a GPU refuse to draw without it' requires_gpu "$work/1.37-everything.yaml"
     helm template test helm/fluxglobe --kube-version 1.37.0 --set renderWorker.gpu.enabled=false >"$work/no-gpu.yaml"
     refused 'the look for FLUXGLOBE_REQUIRE_GPU' 'no worker' requires_gpu "$work/no-gpu.yaml"
@@ -140,6 +164,10 @@ check_chart() {
     refused kubeconform formulae schemas_of 1.37 "$work/fault.yaml"
     sed 's/runAsNonRoot: true/runAsNonRoot: "yes"/' "$work/1.37-everything.yaml" >"$work/fault.yaml"
     refused kubeconform runAsNonRoot schemas_of 1.37 "$work/fault.yaml"
+}
+
+tells_clients() {
+    grep --quiet 'name: FLUXGLOBE_CLIENT_HEADER, value: "x-forwarded-for"' "$1" || { echo 'all are one client' && return 1; }
 }
 
 requires_gpu() { grep --quiet 'name: FLUXGLOBE_REQUIRE_GPU, value: "true"' "$1" || { echo 'no worker requires a GPU' && return 1; }; }
@@ -157,6 +185,8 @@ check_unit() {
     refused 'the look at a unit'"'"'s secrets' FLUXGLOBE_KAFKA_PASSWORD_FILE "$tools/bin/python" -B check/unit.py "$work/fluxglobe@.service"
     sed '/^User=/d' fluxglobe@.service >"$work/fluxglobe@.service"
     refused 'the look at a unit'"'"'s user' 'one user for all services' "$tools/bin/python" -B check/unit.py "$work/fluxglobe@.service"
+    sed 's/^User=.*/DynamicUser=yes/' fluxglobe.service >"$work/fluxglobe.service"
+    refused 'the look at a unit'"'"'s user' 'no user that can land files' "$tools/bin/python" -B check/unit.py "$work/fluxglobe.service"
     sed '/^StartLimitIntervalSec=/d' fluxglobe@.service >"$work/fluxglobe@.service"
     refused 'the look at a unit'"'"'s starts' 'gives up' "$tools/bin/python" -B check/unit.py "$work/fluxglobe@.service"
     if ! command -v systemd-analyze >/dev/null; then

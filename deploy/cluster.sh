@@ -3,7 +3,7 @@
 #   deploy/cluster.sh up       start the servers, then all services; send notices of sample files; say where to look
 #   deploy/cluster.sh down     stop the services, then the servers; data stay
 #   deploy/cluster.sh status   exit code 0 only when every service is ready
-#   deploy/cluster.sh env      the settings that reach the cluster, as `export` lines
+#   deploy/cluster.sh env      the settings that reach the cluster and the folder of the program, as `export` lines
 #   deploy/cluster.sh targets  what Prometheus scrapes: SERVICE=HOST:PORT, with commas
 # FLUXGLOBE_PROGRAM: the built program. FLUXGLOBE_RUN: folder of logs and data. FLUXGLOBE_LISTEN: the tile server's
 # address, 127.0.0.1:8080 unless told otherwise. FLUXGLOBE_SAMPLES: folder of sample files; `none` sends nothing.
@@ -144,7 +144,10 @@ case ${1:-} in
 up) up ;;
 down) down ;;
 status) status ;;
-env) settings ;;
+env)
+    settings
+    echo "export PATH=$(realpath --canonicalize-missing "$(dirname "$program")"):\$PATH"
+    ;;
 targets) targets ;;
 *)
     sed -n '2,9s/^# \?//p' "${BASH_SOURCE[0]}" >&2

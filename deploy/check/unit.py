@@ -1,7 +1,8 @@
 """Reads a systemd unit and says what its services could not do, or could do to each other: python unit.py UNIT.
 
 The root file system is read-only to a service, so every folder that it writes must lie in its state directory. Services
-of one machine are users of their own, and are started as often as they end.
+of one machine are users of their own, and are started as often as they end. The one server that does everything is a user
+that stays, so that files can be landed beside it.
 """
 
 import sys
@@ -45,6 +46,8 @@ def faults(unit: Path) -> list[str]:
             found.append(f"{unit.name} does not hand over {name}")
     if kind == "fluxglobe@" and not any("%i" in user for user in service.get("User", [])):
         found.append(f"{unit.name} has one user for all services")
+    if kind == "fluxglobe" and (service.get("User") != ["fluxglobe"] or "DynamicUser" in service):
+        found.append(f"{unit.name} has no user that can land files beside it")
     if service.get("StartLimitIntervalSec") != ["0"]:
         found.append(f"{unit.name} gives up a service that ended often")
     return found

@@ -4,6 +4,7 @@
 
 mod animation;
 mod attached_bucket;
+mod backup;
 mod bad_clients;
 mod bad_input;
 mod bench_serve;

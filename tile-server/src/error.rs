@@ -43,6 +43,10 @@ fn names(all: &[ProductId]) -> String {
     }
 }
 
+/// Lies beside an answer that is none since a part is away or ends, and not since there is too much to do: both are 503.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Away;
+
 /// Why a request has no answer.
 #[derive(Debug, Clone, thiserror::Error)]
 pub enum ServerError {
@@ -220,6 +224,15 @@ impl ServerError {
         self.retry_after_s().is_some()
     }
 
+    /// Is who asked sent away for others who ask?
+    fn is_full(&self) -> bool {
+        match self {
+            Self::Busy | Self::TooManyListeners | Self::TooManyStreams => true,
+            Self::Backend(error) => error.class == Class::Busy,
+            _ => false,
+        }
+    }
+
     fn retry_after_s(&self) -> Option<u16> {
         match self {
             Self::Busy => Some(RETRY_BUSY_S),
@@ -259,6 +272,9 @@ impl IntoResponse for ServerError {
         headers.insert(header::CACHE_CONTROL, HeaderValue::from_static("no-store"));
         if let Some(seconds) = self.retry_after_s() {
             headers.insert(header::RETRY_AFTER, seconds.into());
+        }
+        if status == StatusCode::SERVICE_UNAVAILABLE && !self.is_full() {
+            response.extensions_mut().insert(Away);
         }
         if matches!(self, Self::TooManyStreams) {
             // Who has no stream keeps no connection from others either.

@@ -9,8 +9,8 @@ use contract::digest::Digest;
 use contract::encoding::Encoding;
 use contract::job::{RenderJob, View};
 use contract::key::ObjectKey;
-use quick_cache::Weighter;
-use quick_cache::sync::Cache;
+use quick_cache::sync::{Cache, DefaultLifecycle};
+use quick_cache::{DefaultHashBuilder, OptionsBuilder, Weighter};
 use storage::{StorageError, Store};
 use tokio::task::AbortHandle;
 
@@ -33,6 +33,9 @@ const AWAY_LIMIT: Duration = Duration::from_secs(8);
 const TYPICAL_BYTES: u64 = 20 << 10;
 /// Memory an entry takes besides its bytes: digest, handle and the cache's own tables.
 const ENTRY_BYTES: u64 = 128;
+/// The least that a part of the memory has, bytes. A picture lies in one of the parts, which takes none that fills more than
+/// 97 % of it; the cache's own number of parts is four a core, and on many cores no large view would find room.
+const PART_BYTES: u64 = 64 << 20;
 
 #[derive(Debug, Clone)]
 struct ByBytes;
@@ -41,6 +44,24 @@ impl Weighter<Digest, Bytes> for ByBytes {
     fn weight(&self, _digest: &Digest, picture: &Bytes) -> u64 {
         picture.len() as u64 + ENTRY_BYTES
     }
+}
+
+/// A memory of so many bytes, in parts of [`PART_BYTES`] and more, whatever the number of cores.
+fn memory_of(bytes: u64) -> Cache<Digest, Bytes, ByBytes> {
+    // The cache rounds the number up to a power of two, which would make them smaller.
+    let parts = 1_usize << (bytes / PART_BYTES).checked_ilog2().unwrap_or(0);
+    let options = OptionsBuilder::new()
+        .shards(parts)
+        .estimated_items_capacity((bytes / TYPICAL_BYTES).max(16) as usize)
+        .weight_capacity(bytes)
+        .build()
+        .expect("both capacities are given");
+    Cache::with_options(
+        options,
+        ByBytes,
+        DefaultHashBuilder::default(),
+        DefaultLifecycle::default(),
+    )
 }
 
 /// The pictures of one server.
@@ -101,11 +122,6 @@ impl Pictures {
         limits: &Limits,
         metrics: Metrics,
     ) -> Self {
-        let memory = Cache::with_weighter(
-            (limits.memory_bytes / TYPICAL_BYTES).max(16) as usize,
-            limits.memory_bytes,
-            ByBytes,
-        );
         Self {
             flights: SingleFlight::default(),
             maker: Arc::new(Maker {
@@ -113,7 +129,7 @@ impl Pictures {
                 allowance: Allowance::new(limits.stored_bytes_per_day, Instant::now()),
                 drawer,
                 gate,
-                memory,
+                memory: memory_of(limits.memory_bytes),
                 request_limit: limits.request_limit,
                 metrics,
             }),
@@ -323,5 +339,34 @@ impl Maker {
         // A copy: what came over a connection is a part of its buffer, which would be kept as a whole and counted as this part.
         self.memory.insert(digest, Bytes::copy_from_slice(picture));
         self.metrics.cache_bytes.set(self.memory.weight() as i64);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Is a picture of so many bytes found in a memory of so many, by whatever digest?
+    fn is_remembered(picture_bytes: usize, memory_bytes: u64) -> bool {
+        let memory = memory_of(memory_bytes);
+        let picture = Bytes::from(vec![0_u8; picture_bytes]);
+        (0..16_u8).all(|view| {
+            let digest = Digest::of(&[view]);
+            memory.insert(digest, picture.clone());
+            memory.get(&digest).is_some()
+        })
+    }
+
+    #[test]
+    fn large_views_are_remembered_whatever_the_number_of_cores() {
+        assert!(is_remembered(10 << 20, 64 << 20), "a small memory");
+        assert!(is_remembered(60 << 20, 256 << 20), "all parts are as large");
+        assert!(is_remembered(60 << 20, 500 << 20), "no power of two");
+        assert!(!is_remembered(65 << 20, 64 << 20), "it has an end");
+    }
+
+    #[test]
+    fn the_memory_may_be_none() {
+        assert!(!is_remembered(1, 0));
     }
 }

@@ -12,6 +12,7 @@ use axum::response::Response;
 use http_body::{Frame, SizeHint};
 use prometheus::{Histogram, IntCounter, IntGauge};
 
+use crate::error::Away;
 use crate::state::AppState;
 
 /// The route of what is no route: the viewer's files and unknown addresses.
@@ -48,7 +49,7 @@ pub(crate) async fn count(State(state): State<AppState>, request: Request, next:
     let status = response.status();
     metrics
         .requests
-        .with_label_values(&[route, method, outcome_label(status)])
+        .with_label_values(&[route, method, outcome_label(&response)])
         .inc();
     metrics
         .request_duration_s
@@ -133,12 +134,14 @@ fn method_label(method: &Method) -> &'static str {
     }
 }
 
-/// The words that all services count by.
-fn outcome_label(status: StatusCode) -> &'static str {
-    match status {
+/// The words that all services count by. A server that is not ready, as `/readyz` says it, counts as busy: nothing failed.
+fn outcome_label(answer: &Response) -> &'static str {
+    let is_away = answer.extensions().get::<Away>().is_some();
+    match answer.status() {
+        StatusCode::SERVICE_UNAVAILABLE if is_away => "retryable",
         StatusCode::SERVICE_UNAVAILABLE => "busy",
-        _ if status.is_server_error() => "failed",
-        _ if status.is_client_error() => "refused",
+        status if status.is_server_error() => "failed",
+        status if status.is_client_error() => "refused",
         _ => "ok",
     }
 }

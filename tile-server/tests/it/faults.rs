@@ -5,8 +5,10 @@ use std::path::Path;
 use axum::http::StatusCode;
 use contract::quantity::Quantity;
 use storage::Store;
+use tile_server::backend::Class;
 
 use crate::app::TestApp;
+use crate::doubles::Mood;
 
 /// A link to itself among the manifests: every listing fails, and not because there is nothing.
 fn break_store(folder: &Path) {
@@ -127,4 +129,33 @@ async fn products_of_a_disk_that_is_gone_stay_known_and_the_server_says_so() {
         "{}",
         ready.text()
     );
+}
+
+/// How many tiles were answered so.
+async fn tiles(app: &TestApp, outcome: &str) -> u64 {
+    let route = "/tiles/{product}/{mode}/{z}/{x}/{y_png}";
+    let labels = format!(r#"method="GET",operation="{route}",outcome="{outcome}""#);
+    app.metric(&format!("fluxglobe_tile_server_requests_total{{{labels}}}"))
+        .await
+}
+
+#[tokio::test]
+async fn what_is_away_is_counted_as_an_error_and_not_as_too_many_who_ask() {
+    let folder = tempfile::tempdir().unwrap();
+    break_store(folder.path());
+    let app = over(folder.path());
+    let tile = "/tiles/flux/map/0/0/0.png";
+    let away = app.get(tile).await;
+    assert_eq!(away.status, StatusCode::SERVICE_UNAVAILABLE);
+    let counted = [tiles(&app, "retryable").await, tiles(&app, "busy").await];
+    assert_eq!(counted, [1, 0], "the store");
+    mend_store(folder.path());
+    app.land("flux", Quantity::CarbonFlux, 1).await;
+    for (class, counted) in [(Class::Unavailable, [2, 0]), (Class::Busy, [2, 1])] {
+        app.drawer.set(Mood::fails(class, "a worker"));
+        let none = app.get(tile).await;
+        assert_eq!(none.status, StatusCode::SERVICE_UNAVAILABLE);
+        let now = [tiles(&app, "retryable").await, tiles(&app, "busy").await];
+        assert_eq!(now, counted, "{class:?}");
+    }
 }
