@@ -268,13 +268,13 @@ impl IntoResponse for ServerError {
             tracing::warn!(status = status.as_u16(), error = %self, cause, "a request failed");
         }
         let mut response = (status, Json(Refusal { error: self.text() })).into_response();
+        if status == StatusCode::SERVICE_UNAVAILABLE && !self.is_full() {
+            response.extensions_mut().insert(Away);
+        }
         let headers = response.headers_mut();
         headers.insert(header::CACHE_CONTROL, HeaderValue::from_static("no-store"));
         if let Some(seconds) = self.retry_after_s() {
             headers.insert(header::RETRY_AFTER, seconds.into());
-        }
-        if status == StatusCode::SERVICE_UNAVAILABLE && !self.is_full() {
-            response.extensions_mut().insert(Away);
         }
         if matches!(self, Self::TooManyStreams) {
             // Who has no stream keeps no connection from others either.
