@@ -3,11 +3,10 @@
 
 mod whole_numbers;
 
-use std::ops::Range;
+use std::ops::{Range, RangeInclusive};
 use std::sync::Arc;
 
 use contract::masked::MaskedCells;
-use contract::quantity::Quantity;
 
 use crate::error::{Rejection, Stop};
 use crate::inspect::file::description::Part;
@@ -92,20 +91,20 @@ struct Converted {
     axes: Vec<Axis>,
     mapping: Mapping,
     packing: Packing,
-    /// May one of the stored numbers mean no data though nothing says so?
-    has_ends: bool,
+    /// What values can be, where one of the stored numbers may mean no data though nothing says so; none where a profile says what does.
+    unmarked_in: Option<RangeInclusive<f64>>,
     /// Where they may have more digits than values have.
     whole: Option<WholeNumbers>,
 }
 
 impl Conversion {
     pub(crate) fn of(plan: &Plan) -> Self {
-        let is_open = matches!(plan.target.quantity, Quantity::Open(_));
+        let has_profile = plan.recipe.profile.is_some();
         Self(Arc::new(Converted {
             axes: plan.axes.clone(),
             mapping: plan.mapping.clone(),
             packing: plan.packing.clone(),
-            has_ends: is_open && plan.recipe.profile.is_none(),
+            unmarked_in: (!has_profile).then(|| plan.target.quantity.plausible()),
             whole: WholeNumbers::of(plan),
         }))
     }
@@ -132,7 +131,7 @@ impl Conversion {
             axes,
             mapping,
             packing,
-            has_ends,
+            unmarked_in,
             whole,
         } = &*self.0;
         let RawBand {
@@ -149,8 +148,13 @@ impl Conversion {
             *stored = f64::NAN;
         }
         let mut ends = Ends::default();
-        if *has_ends {
-            let valued = stored.iter().filter(|stored| is_value(**stored));
+        if let Some(plausible) = unmarked_in {
+            // What cannot be true is masked as it is.
+            let can_be = |stored: f64| match packing.unpacked(stored) {
+                Unpacked::Value(value) => plausible.contains(&(value * step.factor + step.offset)),
+                Unpacked::Missing | Unpacked::OutOfRange => false,
+            };
+            let valued = stored.iter().filter(|stored| can_be(**stored));
             valued.for_each(|stored| ends.add(*stored));
         }
         if let Some(whole) = whole {

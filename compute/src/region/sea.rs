@@ -65,6 +65,22 @@ mod tests {
     }
 
     #[test]
+    fn corners_along_straight_edges_change_nothing() {
+        let straight = sea_m2("POLYGON((-90 20,90 20,90 80,-90 80,-90 20))");
+        let one = sea_m2("POLYGON((-90 20,0 20,90 20,90 80,-90 80,-90 20))");
+        assert!((one / straight - 1.0).abs() < 1e-9, "{one} {straight}");
+        // One at every cell, as masks have them, at many latitudes.
+        for south in (-88..88).step_by(8) {
+            let along = |north: i32| (-180..=180).map(move |lon| format!("{lon} {north}"));
+            let back = along(90).collect::<Vec<_>>().into_iter().rev();
+            let corners: Vec<String> = along(south).chain(back).collect();
+            let many = sea_m2(&format!("POLYGON(({},-180 {south}))", corners.join(",")));
+            let few = sea_m2(&format!("-180,{south},180,90"));
+            assert!((many / few - 1.0).abs() < 1e-9, "{south}: {many} {few}");
+        }
+    }
+
+    #[test]
     fn open_sea_is_all_sea_and_inland_none() {
         let open = "-40,20,-30,30";
         let region: Region = open.parse().unwrap();

@@ -6,7 +6,7 @@ use rstar::{AABB, RTree, RTreeObject as _};
 
 use super::area::signed_area_m2;
 use super::cut::{WORLD_DEG, bounds_deg, into_the_world};
-use super::lattice::{Lattice, difference, edges};
+use super::lattice::{Lattice, difference, edges, straightened};
 use super::ring::{Checked, Ring};
 
 /// The rings of the union of polygons.
@@ -76,8 +76,7 @@ fn overlaid(polygons: &[Parts], as_written: Option<&[&Checked]>) -> Vec<Ring> {
         let (outers, holes): (Vec<_>, Vec<_>) =
             (contours(&polygon.outers), contours(&polygon.holes));
         shapes.extend(difference(&outers, &holes));
-        given.extend(outers);
-        given.extend(holes);
+        given.extend(outers.iter().chain(&holes).map(straightened));
     }
     if polygons.len() > 1 {
         let contours: Vec<_> = shapes.into_iter().flatten().collect();

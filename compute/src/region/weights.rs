@@ -22,8 +22,9 @@ use crate::workshop::Workshop;
 
 /// Version of the way weights of boxes are computed: it changes when their bits do.
 const BOX_METHOD: u32 = 1;
-/// The same of polygons and of the sea. 2: edges are as wide as they are written, what overlaps counts once.
-const POLYGON_METHOD: u32 = 2;
+/// The same of polygons and of the sea. 2: edges are as wide as they are written, what overlaps counts once. 3: corners along straight edges
+/// change no sea.
+const POLYGON_METHOD: u32 = 3;
 /// The figure of the earth that weights and sums of named regions are stored for.
 pub const EARTH: Earth = Earth::Wgs84;
 

@@ -4,6 +4,7 @@ use contract::earth::Earth;
 use contract::region::{Polygon, Region};
 
 use crate::region::extent::region_area_m2;
+use crate::region::ring::Ring;
 use crate::region::rings::rings;
 
 type Corners = Vec<[f64; 2]>;
@@ -46,6 +47,17 @@ fn what_repeats_counts_once() {
     assert_close(area(&[(twice, vec![])]), area(std::slice::from_ref(&one)));
     let doubled = one.0.iter().flat_map(|corner| [*corner; 2]).collect();
     assert_close(area(&[(doubled, vec![])]), area(&[one]));
+}
+
+#[test]
+fn corners_in_the_middle_of_edges_are_kept_as_they_are_written() {
+    let mut outer = square(0.1, 0.2, 0.7);
+    outer.insert(1, [0.3, 0.2]);
+    outer.push([0.1, 0.5]);
+    let hole: Corners = square(0.3, 0.4, 0.1).into_iter().rev().collect();
+    let found = rings(&region(&[(outer.clone(), vec![hole.clone()])])).unwrap();
+    let corners: Vec<&[[f64; 2]]> = found.iter().map(Ring::corners).collect();
+    assert_eq!(corners, [&outer[..], &hole[..]]);
 }
 
 #[test]

@@ -1,5 +1,5 @@
-//! Numbers that mean no data in many files, and of which this file says nothing. What a built-in quantity can be tells them
-//! from values; of any other variable they must be told by where they stand.
+//! Numbers that mean no data in many files, and of which this file says nothing. Those that a quantity cannot be are masked as such; others must be
+//! told by where they stand.
 
 use contract::event::RejectReason;
 
@@ -10,6 +10,8 @@ const USUAL: [f64; 18] = [
     -1e20, -1e10, -99_999.0, -32_768.0, -32_767.0, -9_999.9, -9_999.0, -999.9, -999.0, -128.0,
     255.0, 999.0, 9_999.0, 32_767.0, 65_535.0, 99_999.0, 1e10, 1e20,
 ];
+/// How much further from all others than these are from each other a single negative number must lie, where none of them is negative.
+const ALONE: f64 = 10.0;
 /// How near in float32 a number is the one that was meant.
 const SAME: f64 = 1e-6;
 
@@ -84,15 +86,20 @@ impl Ends {
     }
 
     /// Refuses stored numbers of which one usual number for no data, several times there, lies further from all others than these
-    /// from each other.
+    /// from each other; so does a single negative one that lies much further from others that are not negative.
     pub(crate) fn check(&self, variable: &str) -> Result<(), Rejection> {
         let Some([lowest, highest]) = self.ends else {
             return Ok(());
         };
         for (is_turned, end, far) in [(false, lowest, highest), (true, highest, lowest)] {
-            let Some(next) = end.next.filter(|_| end.count > 1) else {
+            let Some(next) = end.next else {
                 continue;
             };
+            let is_single = end.count == 1;
+            let is_below_all = !is_turned && end.number < 0.0 && next >= 0.0;
+            if is_single && !is_below_all {
+                continue;
+            }
             let as_it_is = |number: f64| if is_turned { -number } else { number };
             let number = as_it_is(end.number);
             let is_usual = USUAL
@@ -100,7 +107,8 @@ impl Ends {
                 .any(|usual| (number - usual).abs() <= SAME * usual.abs());
             // The other end, seen from this one.
             let far = -far.number;
-            if !is_usual || next - end.number <= far - next {
+            let least = if is_single { ALONE } else { 1.0 };
+            if !is_usual || next - end.number <= least * (far - next) {
                 continue;
             }
             let (there, near, far) = (end.count, as_it_is(next), as_it_is(far));
@@ -142,6 +150,10 @@ mod tests {
             let refused = check("v", &[1.0, fill, 4.0, fill, f64::NAN]).unwrap_err();
             assert!(refused.to_string().contains("fill_values"), "{refused}");
         }
+        assert!(
+            check("v", &[1.0, 4.0, -999.0, f64::NAN]).is_err(),
+            "one alone"
+        );
     }
 
     #[test]
@@ -149,7 +161,9 @@ mod tests {
         for values in [
             vec![-2000.0, -999.0, -999.0, 500.0],
             vec![-999.0, -999.0, 500.0, -400.0],
-            vec![1.0, 4.0, -999.0],
+            vec![1.0, 400.0, -999.0],
+            vec![-1.0, 4.0, -999.0],
+            vec![1.0, 4.0, 999.0],
             vec![1.0, 4.0, 90.0, 90.0],
             vec![-999.0, -999.0],
             vec![],
