@@ -5,7 +5,7 @@ use contract::quantity::Quantity;
 use ingest::{Outcome, Profile};
 
 use crate::fixture::{Place, refusal};
-use crate::made::{Made, MadeFile, Values};
+use crate::made::{Made, MadeFile, Says, Values};
 
 const DOWN: &str = "surface_downward_mass_flux_of_carbon_dioxide_expressed_as_carbon";
 const UP: &str = "surface_upward_mass_flux_of_carbon_dioxide_expressed_as_carbon";
@@ -43,6 +43,30 @@ async fn stored(file: &MadeFile, profile: Option<&Profile>) -> Result<f32, Strin
     };
     let manifest = place.newest(manifest.product.as_str()).await;
     Ok(place.values(&manifest, 0).await[0].signum())
+}
+
+#[tokio::test]
+async fn a_number_for_no_data_that_a_flux_could_be_is_refused_unless_it_is_marked() {
+    let named = [("standard_name", UP)];
+    let file = |marked: bool| {
+        let mut values = vec![5.0; 64];
+        values[10..16].fill(-999.0);
+        let flux = Made::new("flux", &["time", "lat", "lon"], Values::Floats(values))
+            .text("units", "mg C m-2 d-1")
+            .text(named[0].0, named[0].1);
+        let mark = Says::Floats(&[-999.0]);
+        MadeFile::days(2).with(if marked {
+            flux.says("missing_value", mark)
+        } else {
+            flux
+        })
+    };
+    let line = stored(&file(false), None).await.unwrap_err();
+    assert!(
+        line.contains("6 cells of -999") && line.contains("fill_values"),
+        "{line}"
+    );
+    assert_eq!(stored(&file(true), None).await.map(f32::is_nan), Ok(false));
 }
 
 #[tokio::test]
