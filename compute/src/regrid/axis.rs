@@ -16,8 +16,15 @@ pub struct Parts {
     pub whole: f64,
 }
 
-/// The row or column of the source that a position lies in, counted in cells from its first edge; none outside.
+/// Cells that a position may be off an edge by rounding and lie on it.
+const ON_EDGE: f64 = 1e-6;
+
+/// The row or column of the source that a position lies in, counted in cells from its first edge; none outside. An edge is of the cell
+/// south or east of it, whatever rounding makes of the position.
 fn holding(position: f64, count: u32) -> Option<u32> {
+    let edge = position.round();
+    let is_on_edge = (position - edge).abs() < ON_EDGE;
+    let position = if is_on_edge { edge } else { position };
     (position >= 0.0 && position < f64::from(count)).then_some(position as u32)
 }
 

@@ -155,6 +155,24 @@ fn round_the_earth_bilinear_goes_over_the_seam_and_outside_there_is_nothing() {
 
 /// Pairs of grids round the earth of which a centre of the target lies a rounding west of the source's first edge.
 #[test]
+fn a_place_between_two_cells_is_of_the_eastern_one_everywhere() {
+    let globe = |cols: u32, west_deg: f64| Grid {
+        rows: 2,
+        cols,
+        north_deg: 90.0,
+        west_deg,
+        dlat_deg: 90.0,
+        dlon_deg: 360.0 / f64::from(cols),
+    };
+    // Every third centre of the target lies on an edge of the source.
+    let (source, target) = (globe(1440, -179.875), globe(4320, -180.0));
+    for (col, of) in axis::nearest_cols(&source, &target).iter().enumerate() {
+        let thirds = (col as i64 * 2 + 1 - 3).rem_euclid(6 * 1440);
+        assert_eq!(of.parts, [((thirds / 6) as u32, 1.0)], "{col}");
+    }
+}
+
+#[test]
 fn no_column_of_a_globe_is_lost_where_rounding_makes_the_first_edge_the_last() {
     let globe = |cols: u32, west_deg: f64| Grid {
         rows: 2,
