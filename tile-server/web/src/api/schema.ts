@@ -978,10 +978,10 @@ export interface components {
             left_out_count?: number;
             /**
              * Format: double
-             * @description Mean over time, each step by its length; none without data.
+             * @description Mean over time, each step by its time in the asked period; none without data.
              */
             mean: number | null;
-            /** @description First instant that was read. */
+            /** @description First instant that counts. */
             start: components["schemas"]["TimeMs"];
         };
         /**
@@ -1027,7 +1027,10 @@ export interface components {
         GeoJson: {
             type: string;
         };
-        /** @description Places as longitude and latitude, degrees: the last one, or the track of a ship. */
+        /**
+         * @description Places as longitude and latitude, degrees: the last one, or the track of a ship, of at most 2,000 places from its first to its
+         *     last, of the first 50 ships.
+         */
         Geometry: {
             coordinates: [
                 number,
@@ -2293,6 +2296,8 @@ export interface operations {
                 kind?: components["schemas"]["PlatformKind"];
                 /** @description Data set. */
                 dataset?: string;
+                /** @description Worst quality of the observations that count; all do unless one is given. */
+                worst?: components["schemas"]["Quality"];
             };
             header?: never;
             path?: never;
@@ -2325,7 +2330,7 @@ export interface operations {
                     "application/json": components["schemas"]["Refusal"];
                 };
             };
-            /** @description This server has no observations */
+            /** @description This server has no observations, or none of this data set */
             404: {
                 headers: {
                     [name: string]: unknown;
@@ -2376,6 +2381,8 @@ export interface operations {
                 from?: string;
                 /** @description First instant after the period. */
                 to?: string;
+                /** @description Worst quality that is still wanted; all are unless one is given. */
+                worst?: components["schemas"]["Quality"];
                 /** @description Most observations of the answer; 2000 unless told otherwise. */
                 limit?: number;
                 /** @description Where the answer before ended: its `next`. */
@@ -2653,11 +2660,11 @@ export interface operations {
             query: {
                 /** @description What is made of the series: `climatology`, `anomaly`, `trend`, `season`, `extremes`, several with commas. */
                 parts: string;
-                /** @description Years of the climatology, both part of it: `1991/2020`; all that are covered unless given. */
+                /** @description Years of the climatology and the anomaly, both part of it: `1991/2020`; all that are covered unless given. Of these parts alone. */
                 base?: string;
-                /** @description Parts of the year of the climatology: `month` (the default), `season` or `day`. */
+                /** @description Parts of the year of the climatology and the anomaly: `month` (the default), `season` or `day`. Of these parts alone. */
                 bins?: string;
-                /** @description Means that the trend is drawn through; `month` unless told otherwise. */
+                /** @description Means that the trend is drawn through; `month` unless told otherwise. Of the trend alone. */
                 trend_step?: components["schemas"]["TimeStep"];
                 /**
                  * @description Least coverage, percent: steps that hold data over less of the region's sea, or of the line, are left out, and the answer says
@@ -2682,9 +2689,9 @@ export interface operations {
                 from?: string;
                 /** @description First instant after the period; the product's own unless one is given. */
                 to?: string;
-                /** @description Figure of the earth for areas and lengths; `wgs84` unless one is given. */
+                /** @description Figure of the earth for areas and lengths, of a region or a line; `wgs84` unless one is given. */
                 earth?: components["schemas"]["Earth"];
-                /** @description Landed product whose cells say how much of them is sea or land, in place of Natural Earth. */
+                /** @description Landed product whose cells say how much of them is sea or land, in place of Natural Earth; of a region alone. */
                 ocean?: string;
                 /** @description Version, as answers name it, with or without its digest; the newest unless one is given. */
                 manifest?: string;
@@ -2779,11 +2786,11 @@ export interface operations {
             query: {
                 /** @description What is made of the series: `climatology`, `anomaly`, `trend`, `season`, `extremes`, several with commas. */
                 parts: string;
-                /** @description Years of the climatology, both part of it: `1991/2020`; all that are covered unless given. */
+                /** @description Years of the climatology and the anomaly, both part of it: `1991/2020`; all that are covered unless given. Of these parts alone. */
                 base?: string;
-                /** @description Parts of the year of the climatology: `month` (the default), `season` or `day`. */
+                /** @description Parts of the year of the climatology and the anomaly: `month` (the default), `season` or `day`. Of these parts alone. */
                 bins?: string;
-                /** @description Means that the trend is drawn through; `month` unless told otherwise. */
+                /** @description Means that the trend is drawn through; `month` unless told otherwise. Of the trend alone. */
                 trend_step?: components["schemas"]["TimeStep"];
                 /**
                  * @description Least coverage, percent: steps that hold data over less of the region's sea, or of the line, are left out, and the answer says
@@ -2794,9 +2801,9 @@ export interface operations {
                 from?: string;
                 /** @description First instant after the period; the product's own unless one is given. */
                 to?: string;
-                /** @description Figure of the earth for areas and lengths; `wgs84` unless one is given. */
+                /** @description Figure of the earth for areas and lengths, of a region or a line; `wgs84` unless one is given. */
                 earth?: components["schemas"]["Earth"];
-                /** @description Landed product whose cells say how much of them is sea or land, in place of Natural Earth. */
+                /** @description Landed product whose cells say how much of them is sea or land, in place of Natural Earth; of a region alone. */
                 ocean?: string;
                 /** @description Version, as answers name it, with or without its digest; the newest unless one is given. */
                 manifest?: string;
@@ -3249,13 +3256,13 @@ export interface operations {
                 correlation_length_km?: number;
                 /** @description How long errors of steps go together, days: exp(-t / days). 0, the error of each step is its own, unless given. */
                 correlation_days?: number;
-                /** @description Draws of a Monte Carlo, 10 to 10000: a check, and an interval that holds 95 % of the budgets. */
+                /** @description Draws of a Monte Carlo, 10 to 10000: a check, and an interval that holds 95 % of the budgets. Not of a history. */
                 monte_carlo?: number;
                 /** @description The same seed draws the same errors; 0 unless given. */
                 seed?: number;
                 /**
                  * @description Outgassing of river carbon that is taken off, Tg of carbon a year out of the sea, with its standard error if there is one
-                 *     (`650` or `650±300`), or a product that is summed over the same region.
+                 *     (`650` or `650±300`), or a product that is summed over the same region. Not of a history.
                  */
                 river_flux?: string;
                 /** @description Where the number is from; needed with it. */
@@ -3391,13 +3398,13 @@ export interface operations {
                 correlation_length_km?: number;
                 /** @description How long errors of steps go together, days: exp(-t / days). 0, the error of each step is its own, unless given. */
                 correlation_days?: number;
-                /** @description Draws of a Monte Carlo, 10 to 10000: a check, and an interval that holds 95 % of the budgets. */
+                /** @description Draws of a Monte Carlo, 10 to 10000: a check, and an interval that holds 95 % of the budgets. Not of a history. */
                 monte_carlo?: number;
                 /** @description The same seed draws the same errors; 0 unless given. */
                 seed?: number;
                 /**
                  * @description Outgassing of river carbon that is taken off, Tg of carbon a year out of the sea, with its standard error if there is one
-                 *     (`650` or `650±300`), or a product that is summed over the same region.
+                 *     (`650` or `650±300`), or a product that is summed over the same region. Not of a history.
                  */
                 river_flux?: string;
                 /** @description Where the number is from; needed with it. */
@@ -3559,13 +3566,13 @@ export interface operations {
                 correlation_length_km?: number;
                 /** @description How long errors of steps go together, days: exp(-t / days). 0, the error of each step is its own, unless given. */
                 correlation_days?: number;
-                /** @description Draws of a Monte Carlo, 10 to 10000: a check, and an interval that holds 95 % of the budgets. */
+                /** @description Draws of a Monte Carlo, 10 to 10000: a check, and an interval that holds 95 % of the budgets. Not of a history. */
                 monte_carlo?: number;
                 /** @description The same seed draws the same errors; 0 unless given. */
                 seed?: number;
                 /**
                  * @description Outgassing of river carbon that is taken off, Tg of carbon a year out of the sea, with its standard error if there is one
-                 *     (`650` or `650±300`), or a product that is summed over the same region.
+                 *     (`650` or `650±300`), or a product that is summed over the same region. Not of a history.
                  */
                 river_flux?: string;
                 /** @description Where the number is from; needed with it. */
@@ -3701,13 +3708,13 @@ export interface operations {
                 correlation_length_km?: number;
                 /** @description How long errors of steps go together, days: exp(-t / days). 0, the error of each step is its own, unless given. */
                 correlation_days?: number;
-                /** @description Draws of a Monte Carlo, 10 to 10000: a check, and an interval that holds 95 % of the budgets. */
+                /** @description Draws of a Monte Carlo, 10 to 10000: a check, and an interval that holds 95 % of the budgets. Not of a history. */
                 monte_carlo?: number;
                 /** @description The same seed draws the same errors; 0 unless given. */
                 seed?: number;
                 /**
                  * @description Outgassing of river carbon that is taken off, Tg of carbon a year out of the sea, with its standard error if there is one
-                 *     (`650` or `650±300`), or a product that is summed over the same region.
+                 *     (`650` or `650±300`), or a product that is summed over the same region. Not of a history.
                  */
                 river_flux?: string;
                 /** @description Where the number is from; needed with it. */
@@ -3867,7 +3874,7 @@ export interface operations {
                 from?: string;
                 /** @description First instant after the period; the products' own unless one is given. */
                 to?: string;
-                /** @description Figure of the earth for areas and lengths; `wgs84` unless one is given. */
+                /** @description Figure of the earth for areas and lengths, of a region or a line; `wgs84` unless one is given. */
                 earth?: components["schemas"]["Earth"];
                 /** @description Version, as answers name it, with or without its digest; the newest unless one is given. */
                 manifest?: string;
@@ -3979,7 +3986,7 @@ export interface operations {
                 from?: string;
                 /** @description First instant after the period; the products' own unless one is given. */
                 to?: string;
-                /** @description Figure of the earth for areas and lengths; `wgs84` unless one is given. */
+                /** @description Figure of the earth for areas and lengths, of a region or a line; `wgs84` unless one is given. */
                 earth?: components["schemas"]["Earth"];
                 /** @description Version, as answers name it, with or without its digest; the newest unless one is given. */
                 manifest?: string;
@@ -4129,7 +4136,7 @@ export interface operations {
                  *     in it.
                  */
                 line?: string;
-                /** @description Figure of the earth for areas and lengths; `wgs84` unless one is given. */
+                /** @description Figure of the earth for areas and lengths, of a region or a line; `wgs84` unless one is given. */
                 earth?: components["schemas"]["Earth"];
             };
             header?: never;
@@ -4235,7 +4242,7 @@ export interface operations {
                  *     says how many; 0 unless told otherwise.
                  */
                 min_coverage?: number;
-                /** @description Figure of the earth for areas and lengths; `wgs84` unless one is given. */
+                /** @description Figure of the earth for areas and lengths, of a region or a line; `wgs84` unless one is given. */
                 earth?: components["schemas"]["Earth"];
             };
             header?: never;
