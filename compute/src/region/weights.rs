@@ -22,9 +22,12 @@ use crate::workshop::Workshop;
 
 /// Version of the way weights of boxes are computed: it changes when their bits do.
 const BOX_METHOD: u32 = 1;
-/// The same of polygons and of the sea. 2: edges are as wide as they are written, what overlaps counts once. 3: corners along straight edges
-/// change no sea.
-const POLYGON_METHOD: u32 = 3;
+/// The same of polygons and of the sea. 2: edges are as wide as they are written, what overlaps counts once.
+const POLYGON_METHOD: u32 = 2;
+/// The same of polygons with corners along straight edges, which changed their sea.
+const STRAIGHTENED_METHOD: u32 = 3;
+/// Distance from the line between its neighbours up to which a corner may have been one of these once it is rounded, degrees.
+const STRAIGHT_DEG: f64 = 2e-6;
 /// The figure of the earth that weights and sums of named regions are stored for.
 pub const EARTH: Earth = Earth::Wgs84;
 
@@ -234,7 +237,7 @@ pub fn key_of(grid: &Grid, region: &Region, earth: Earth, surface: &Surface) -> 
     let is_polygonal = *surface == Surface::Ocean || matches!(region, Region::Polygons(_));
     ObjectKey::weights(&Digest::of_json(&Job {
         method: if is_polygonal {
-            POLYGON_METHOD
+            polygon_method(region)
         } else {
             BOX_METHOD
         },
@@ -245,6 +248,34 @@ pub fn key_of(grid: &Grid, region: &Region, earth: Earth, surface: &Surface) -> 
         // Left out for whole regions, whose keys are older than this.
         surface: (*surface != Surface::All).then_some(surface),
     }))
+}
+
+fn polygon_method(region: &Region) -> u32 {
+    let is_straight = |[from, by, to]: [[f64; 2]; 3]| {
+        let [a, b] = [
+            [by[0] - from[0], by[1] - from[1]],
+            [to[0] - from[0], to[1] - from[1]],
+        ];
+        (a[0] * b[1] - a[1] * b[0]).abs() <= STRAIGHT_DEG * b[0].hypot(b[1])
+    };
+    let has_straight = |ring: &Vec<[f64; 2]>| {
+        let next = |step: usize| ring.iter().cycle().skip(step);
+        let corners = ring.iter().zip(next(1)).zip(next(2));
+        corners
+            .map(|((from, by), to)| [*from, *by, *to])
+            .any(is_straight)
+    };
+    let Region::Polygons(polygons) = region else {
+        return POLYGON_METHOD;
+    };
+    let mut rings = polygons
+        .iter()
+        .flat_map(|polygon| std::iter::once(&polygon.outer).chain(&polygon.holes));
+    if rings.any(has_straight) {
+        STRAIGHTENED_METHOD
+    } else {
+        POLYGON_METHOD
+    }
 }
 
 /// The key of stored weights, which are computed if nobody did before or if they are damaged; none if the region lies

@@ -127,7 +127,7 @@ fn is_nameless_flag(variable: &Variable) -> bool {
         "spread",
         "station",
         "uncertain",
-        "varian",
+        "variance",
     ];
     /// Words that are short of them.
     const SHORT: [&str; 11] = [

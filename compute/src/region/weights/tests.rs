@@ -362,3 +362,20 @@ async fn shares_of_a_product_give_the_same_weights_in_bands_of_any_size() {
         }
     }
 }
+
+#[test]
+fn weights_of_polygons_with_corners_along_straight_edges_have_names_of_their_own() {
+    let of = |text: &str| polygon_method(&text.parse().unwrap());
+    assert_eq!(
+        of("POLYGON((-90 20,90 20,90 80,-90 80,-90 20))"),
+        POLYGON_METHOD
+    );
+    assert_eq!(of("POLYGON((0 0,10 1,20 0,10 9,0 0))"), POLYGON_METHOD);
+    assert_eq!(of("global"), POLYGON_METHOD);
+    for straight in [
+        "POLYGON((-90 20,0 20,90 20,90 80,-90 80,-90 20))",
+        "POLYGON((0 0,10 0,20 0,10 9,5 4.5,0 0))",
+    ] {
+        assert_eq!(of(straight), STRAIGHTENED_METHOD, "{straight}");
+    }
+}
