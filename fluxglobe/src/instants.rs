@@ -49,7 +49,7 @@ mod tests {
             days.map(|one| Instants::of(days).text(one)),
             ["2000-01-01", "2000-02-01"]
         );
-        let halves = ["2000-01-01", "2000-01-01T12:00", "1969-12-31T23:30"].map(instant);
+        let halves = ["2000-01-01", "2000-01-01T12:00:00Z", "1969-12-31T23:30:59Z"].map(instant);
         assert_eq!(
             halves.map(|one| Instants::of(halves).text(one)),
             ["2000-01-01T00:00", "2000-01-01T12:00", "1969-12-31T23:30"]
