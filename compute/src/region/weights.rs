@@ -259,11 +259,15 @@ fn polygon_method(region: &Region) -> u32 {
         (a[0] * b[1] - a[1] * b[0]).abs() <= STRAIGHT_DEG * b[0].hypot(b[1])
     };
     let has_straight = |ring: &Vec<[f64; 2]>| {
+        let mut ring = ring.clone();
+        ring.dedup();
+        // The first corner may be repeated at the end.
+        if ring.len() > 1 && ring.first() == ring.last() {
+            ring.pop();
+        }
         let next = |step: usize| ring.iter().cycle().skip(step);
-        let corners = ring.iter().zip(next(1)).zip(next(2));
-        corners
-            .map(|((from, by), to)| [*from, *by, *to])
-            .any(is_straight)
+        let mut corners = ring.iter().zip(next(1)).zip(next(2));
+        corners.any(|((from, by), to)| is_straight([*from, *by, *to]))
     };
     let Region::Polygons(polygons) = region else {
         return POLYGON_METHOD;
