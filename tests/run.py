@@ -8,8 +8,10 @@ processes that were killed, go one after the other beside those that compute; li
 says is shown when it ends. A suite that fails hides no other.
 """
 
+import contextlib
 import json
 import os
+import signal
 import subprocess
 import sys
 import threading
@@ -21,7 +23,12 @@ CARGO = os.environ.get("CARGO", "cargo")
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 # How much of what a failed suite said is shown once more at the end, where people look first.
 LAST_LINES = 60
+# A suite that says nothing more is ended and has failed: what waits for ever must not take the others' words with it. The
+# longest takes a quarter of this on two cores.
+LIMIT_S = 1800
 shown = threading.Lock()
+# Suites under way, each leading a group of all that it started.
+under_way = set()
 
 
 def suites():
@@ -51,14 +58,38 @@ def run(name, command, folder, again, results, **more):
     """Runs one suite, shows what it said, and notes how it ended and its last words."""
     start = time.monotonic()
     environment = {**os.environ, **more}
-    ended = subprocess.run(
-        command, cwd=folder, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace"
+    suite = subprocess.Popen(
+        command,
+        cwd=folder,
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        errors="replace",
+        start_new_session=True,
     )
+    under_way.add(suite)
+    try:
+        said, _ = suite.communicate(timeout=LIMIT_S)
+    except subprocess.TimeoutExpired:
+        # With all that it started.
+        os.killpg(suite.pid, signal.SIGKILL)
+        said, _ = suite.communicate()
+        said += f"\nended after {LIMIT_S} s: it had not come to an end\n"
+    under_way.discard(suite)
     seconds = time.monotonic() - start
     with shown:
         print(f"\n===== {name}: {' '.join(command)}", flush=True)
-        print(ended.stdout, flush=True)
-    results.append((name, ended.returncode, seconds, again, ended.stdout.splitlines()[-LAST_LINES:]))
+        print(said, flush=True)
+    results.append((name, suite.returncode, seconds, again, said.splitlines()[-LAST_LINES:]))
+
+
+def end_all(number, _frame):
+    """Whoever ends this ends what it started."""
+    for suite in list(under_way):
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(suite.pid, signal.SIGKILL)
+    os._exit(128 + number)
 
 
 def lane(names, found, results):
@@ -74,6 +105,8 @@ def main():
     unknown = [name for name in [*wanted, *WAITING] if name not in found]
     if unknown:
         sys.exit(f"no such suite: {', '.join(unknown)}; there are {', '.join(sorted(found))}")
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, end_all)
     results = []
     lanes = [
         [name for name in WAITING if name in wanted],

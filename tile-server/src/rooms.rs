@@ -64,9 +64,11 @@ impl<'a> Waiting<'a> {
     fn of(held: &'a Held, client: Client) -> Option<Self> {
         let mut waiting = held.waiting();
         let own = waiting.entry(client).or_default();
-        let has_place = *own < MOST_WAITING;
-        *own += u32::from(has_place);
-        has_place.then_some(Self { held, client })
+        if *own >= MOST_WAITING {
+            return None;
+        }
+        *own += 1;
+        Some(Self { held, client })
     }
 }
 
