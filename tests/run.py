@@ -54,6 +54,12 @@ def suites():
     return found
 
 
+def end(suite):
+    """Ends a suite with all that it started."""
+    with contextlib.suppress(ProcessLookupError):
+        os.killpg(suite.pid, signal.SIGKILL)
+
+
 def run(name, command, folder, again, results, **more):
     """Runs one suite, shows what it said, and notes how it ended and its last words."""
     start = time.monotonic()
@@ -72,8 +78,7 @@ def run(name, command, folder, again, results, **more):
     try:
         said, _ = suite.communicate(timeout=LIMIT_S)
     except subprocess.TimeoutExpired:
-        # With all that it started.
-        os.killpg(suite.pid, signal.SIGKILL)
+        end(suite)
         said, _ = suite.communicate()
         said += f"\nended after {LIMIT_S} s: it had not come to an end\n"
     under_way.discard(suite)
@@ -87,8 +92,7 @@ def run(name, command, folder, again, results, **more):
 def end_all(number, _frame):
     """Whoever ends this ends what it started."""
     for suite in list(under_way):
-        with contextlib.suppress(ProcessLookupError):
-            os.killpg(suite.pid, signal.SIGKILL)
+        end(suite)
     os._exit(128 + number)
 
 
@@ -124,6 +128,11 @@ def main():
     for name, code, seconds, *_ in sorted(results, key=lambda result: -result[2]):
         print(f"{seconds:7.1f} s  {'ok' if code == 0 else 'FAILED'}  {name}")
     failed = [(name, again, last_words) for name, code, _, again, last_words in results if code != 0]
+    # A thread that died has said why above, and took what was to follow it along.
+    ended = {name for name, *_ in results}
+    failed += [(name, found[name][2], ["it was not run"]) for name in wanted if name not in ended]
+    if not sys.argv[1:] and "lints" not in ended:
+        failed.append(("lints", "make check", ["they were not run"]))
     for name, again, last_words in failed:
         print(f"\n===== why {name} failed", *last_words, sep="\n")
         server = "" if name == "lints" else "deploy/with-services.sh "

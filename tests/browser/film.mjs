@@ -16,14 +16,20 @@ export class Film {
     const film = new Film();
     film.#page = page;
     film.#session = await page.context().newCDPSession(page);
-    film.#session.on("Page.screencastFrame", ({ data, sessionId }) => {
-      film.#frames.push(data);
+    film.#session.on("Page.screencastFrame", ({ data, metadata, sessionId }) => {
+      film.#take({ data, time: metadata.timestamp });
       void film.#session.send("Page.screencastFrameAck", { sessionId });
     });
     // A page that decodes pictures.
     film.#reader = await page.context().newPage();
     await page.bringToFront();
     return film;
+  }
+
+  /** Two pictures are compressed at a time, and the later one may be told first. */
+  #take(frame) {
+    const later = this.#frames.findIndex(({ time }) => time > frame.time);
+    this.#frames.splice(later < 0 ? this.#frames.length : later, 0, frame);
   }
 
   async start() {
@@ -40,13 +46,13 @@ export class Film {
 
   /** The newest picture since the start. */
   get last() {
-    return this.#frames.at(-1);
+    return this.#frames.at(-1)?.data;
   }
 
-  /** Every picture since the start. */
+  /** Every picture since the start, in the order of their time. */
   async end() {
     await this.#session.send("Page.stopScreencast");
-    return this.#frames;
+    return this.#frames.map(({ data }) => data);
   }
 
   /** What `measure` makes of the pixels of each picture, given those of other ones as well; it runs in the browser. */
