@@ -88,7 +88,8 @@ impl Expression {
         let in_words = |e: DataFusionError| in_words(&e);
         let names = DFSchema::try_from(Arc::clone(&schema)).map_err(in_words)?;
         let parsed = STATE.create_logical_expr(text, &names);
-        let parsed = parsed.map_err(|e| unknown_name(&e, inputs).unwrap_or_else(|| in_words(e)))?;
+        let parsed =
+            parsed.map_err(|e| unknown_name(&e, text, inputs).unwrap_or_else(|| in_words(e)))?;
         let parsed = rewrite::numbers(parsed).map_err(in_words)?;
         let units = inputs.iter().cloned().collect();
         let unit = match typed::typed(&parsed, &units)? {
@@ -221,9 +222,8 @@ impl Expression {
     }
 }
 
-/// What the engine says, in one line.
 /// What is wrong with a name that is no input, if that is what is wrong.
-fn unknown_name(error: &DataFusionError, inputs: &[(String, Unit)]) -> Option<String> {
+fn unknown_name(error: &DataFusionError, text: &str, inputs: &[(String, Unit)]) -> Option<String> {
     let DataFusionError::SchemaError(schema, _trace) = error.find_root() else {
         return None;
     };
@@ -235,9 +235,24 @@ fn unknown_name(error: &DataFusionError, inputs: &[(String, Unit)]) -> Option<St
         [] => "there are none".to_owned(),
         names => format!("inputs are {}", names.join(", ")),
     };
-    Some(format!("{:?} is not an input; {there}", field.name))
+    let form = if is_last_argument(&field.name, text) && text.contains("unit") {
+        "; a unit stands in single quotes, as in unit(0.17, 'K')"
+    } else {
+        ""
+    };
+    Some(format!("{:?} is not an input; {there}{form}", field.name))
 }
 
+/// Is a name written as the last of several arguments, as the unit of `unit(0.17, K)` and `unit(0.17, "K")` is?
+fn is_last_argument(name: &str, text: &str) -> bool {
+    let plain = |text: &str| -> String {
+        let kept = text.chars().filter(|c| !c.is_whitespace() && *c != '"');
+        kept.flat_map(char::to_lowercase).collect()
+    };
+    plain(text).contains(&format!(",{})", plain(name)))
+}
+
+/// What the engine says, in one line.
 fn in_words(error: &DataFusionError) -> String {
     let text = error.strip_backtrace();
     text.lines().next().unwrap_or_default().to_owned()

@@ -22,7 +22,7 @@ pub struct Sun {
     /// Clockwise from north, degrees.
     #[serde(with = "crate::exact")]
     pub azimuth_deg: f64,
-    /// Above the horizon, degrees, 5 to 90.
+    /// Above the horizon, degrees, 5 to 90. Particles of map tiles are lit as by one no lower than 20, whose shadows stay near them.
     #[serde(with = "crate::exact")]
     pub elevation_deg: f64,
     /// The real sun, if it is shown: globe views are lit from there, maps have day and night by it and keep the slant

@@ -77,8 +77,21 @@ fn bad_time(text: &str) -> ContractError {
     ContractError::invalid(
         "time",
         text,
-        "ISO 8601 UTC, such as 2000-01, 2000-01-16 or 2000-01-16T12:00:00Z",
+        "ISO 8601 UTC, such as 2000-01, 2000-01-16, 2000-01-16T12:00 or 2000-01-16T12:00:00Z",
     )
+}
+
+/// An instant to the minute, with or without an offset, as one with seconds; none of any other form.
+fn with_seconds(s: &str) -> Option<String> {
+    const TO_THE_MINUTE: &[u8] = b"0000-00-00T00:00";
+    let (minute, offset) = s.split_at_checked(TO_THE_MINUTE.len())?;
+    let fits = |(byte, form): (u8, &u8)| match form {
+        b'0' => byte.is_ascii_digit(),
+        sign => byte == *sign,
+    };
+    let is_minute = minute.bytes().zip(TO_THE_MINUTE).all(fits);
+    let is_offset = offset.is_empty() || offset.starts_with(['Z', '+', '-']);
+    (is_minute && is_offset).then(|| format!("{minute}:00{offset}"))
 }
 
 impl Display for TimeMs {
@@ -96,15 +109,18 @@ impl Serialize for TimeMs {
 impl FromStr for TimeMs {
     type Err = ContractError;
 
-    /// Parses a year, a month, a day or an instant; without an offset it is UTC, and a shorter form means its start.
+    /// Parses a year, a month, a day or an instant, with seconds or to the minute, as tables print it; without an offset it is UTC, and a
+    /// shorter form means its start.
     fn from_str(s: &str) -> Result<Self, Self::Err> {
         if s.len() > 40 || !s.is_ascii() {
             return Err(bad_time(s));
         }
-        if let Ok(t) = DateTime::parse_from_rfc3339(s) {
+        let completed = with_seconds(s);
+        let instant = completed.as_deref().unwrap_or(s);
+        if let Ok(t) = DateTime::parse_from_rfc3339(instant) {
             return Self::new(t.timestamp_millis());
         }
-        if let Ok(t) = NaiveDateTime::parse_from_str(s, "%Y-%m-%dT%H:%M:%S%.f") {
+        if let Ok(t) = NaiveDateTime::parse_from_str(instant, "%Y-%m-%dT%H:%M:%S%.f") {
             return Self::new(t.and_utc().timestamp_millis());
         }
         let day = match s.len() {
@@ -238,6 +254,15 @@ mod tests {
     }
 
     #[test]
+    fn instants_to_the_minute_are_read_as_tables_print_them() {
+        let parse = |s: &str| s.parse::<TimeMs>().unwrap().to_string();
+        assert_eq!(parse("2000-01-01T12:00"), "2000-01-01T12:00:00Z");
+        assert_eq!(parse("2000-01-01T12:34Z"), "2000-01-01T12:34:00Z");
+        assert_eq!(parse("2000-01-01T12:34+02:00"), "2000-01-01T10:34:00Z");
+        assert_eq!(parse("2000-01-01T12:34-02:30"), "2000-01-01T15:04:00Z");
+    }
+
+    #[test]
     fn nonsense_times_are_refused() {
         for s in [
             "",
@@ -247,6 +272,19 @@ mod tests {
             "99999",
             "٢٠٠٠",
             "2000-01-01T25:00:00Z",
+            "2000-01-01T12",
+            "2000-01-01T12:",
+            "2000-01-01T12:0",
+            "2000-01-01T24:00",
+            "2000-01-01T12:60",
+            "2000-02-30T12:00",
+            "2000-01-01T12:00:",
+            "2000-01-01T12:00x",
+            "2000-01-01T12:00+",
+            "2000-01-01T12:00Z ",
+            "2000-01-01T 1:00",
+            "-200-01-01T12:00",
+            "0000-01-01T12:00",
             "-0001-01-01",
         ] {
             assert!(s.parse::<TimeMs>().is_err(), "{s}");

@@ -6,6 +6,7 @@
 mod columns;
 pub(crate) mod index;
 mod table;
+mod ways;
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -27,6 +28,7 @@ use crate::platform::{self, Gathering};
 use crate::store::{Counts, ObservationStore};
 use crate::{batch, key, track};
 use index::{Index, Month};
+use ways::{MAX_HELD, Ways};
 
 /// Attempts to commit before other writers are given the right of way.
 const ATTEMPTS: usize = 64;
@@ -170,6 +172,61 @@ impl FileStore {
         rows.sort_by(key::order);
         Ok(rows)
     }
+
+    /// Ways of platforms, read together as far as at most `most` places are held.
+    async fn tracks_holding(
+        &self,
+        queries: &[TrackQuery],
+        most: usize,
+    ) -> Result<Vec<Vec<TrackPoint>>, ObservationError> {
+        for query in queries {
+            track::check(query)?;
+        }
+        let mut tracks = Vec::with_capacity(queries.len());
+        // The last is the next one.
+        let mut waiting = track::together(queries);
+        waiting.reverse();
+        while let Some(part) = waiting.pop() {
+            if let Some(ways) = self.ways(part, most).await? {
+                let way =
+                    |query: &TrackQuery| track::thinned(ways.of(&query.platform), query.limit);
+                tracks.extend(part.iter().map(way));
+            } else {
+                let (first, second) = part.split_at(part.len() / 2);
+                waiting.extend([second, first]);
+            }
+        }
+        Ok(tracks)
+    }
+
+    /// Whole ways of platforms, of one dataset and span of time; none of several that have more than `most` places in all.
+    async fn ways(
+        &self,
+        queries: &[TrackQuery],
+        most: usize,
+    ) -> Result<Option<Ways>, ObservationError> {
+        let mut ways = Ways::default();
+        let [first, others @ ..] = queries else {
+            return Ok(Some(ways));
+        };
+        let filter = Filter {
+            from: first.from,
+            to: first.to,
+            datasets: vec![first.dataset.clone()],
+            platforms: queries.iter().map(|query| query.platform.clone()).collect(),
+            ..Filter::default()
+        };
+        let checked = CheckedFilter::new(&filter)?;
+        for (_, months) in self.months(&checked).await? {
+            for row in self.wanted(&checked, filter.from, months).await? {
+                ways.add(&row);
+            }
+            if ways.held() > most && !others.is_empty() {
+                return Ok(None);
+            }
+        }
+        Ok(Some(ways))
+    }
 }
 
 /// Puts rows among others; what became of them.
@@ -234,26 +291,15 @@ impl ObservationStore for FileStore {
     }
 
     async fn track(&self, query: &TrackQuery) -> Result<Vec<TrackPoint>, ObservationError> {
-        track::check(query)?;
-        let filter = Filter {
-            from: query.from,
-            to: query.to,
-            datasets: vec![query.dataset.clone()],
-            platforms: vec![query.platform.clone()],
-            ..Filter::default()
-        };
-        let checked = CheckedFilter::new(&filter)?;
-        let mut places: Vec<TrackPoint> = vec![];
-        for (_, months) in self.months(&checked).await? {
-            let rows = self.wanted(&checked, query.from, months).await?;
-            places.extend(rows.iter().map(|o| TrackPoint {
-                time: o.time,
-                lon_deg: o.lon_deg,
-                lat_deg: o.lat_deg,
-            }));
-            places.dedup_by_key(|place| place.time);
-        }
-        Ok(track::thinned(places, query.limit))
+        let mut tracks = self.tracks(std::slice::from_ref(query)).await?;
+        Ok(tracks.pop().unwrap_or_default())
+    }
+
+    async fn tracks(
+        &self,
+        queries: &[TrackQuery],
+    ) -> Result<Vec<Vec<TrackPoint>>, ObservationError> {
+        self.tracks_holding(queries, MAX_HELD).await
     }
 
     async fn ready(&self) -> Result<(), ObservationError> {
@@ -264,6 +310,65 @@ impl ObservationStore for FileStore {
                 action: "asking whether it is there",
                 limit: READY,
             }),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::batch::tests::observation;
+
+    /// Places of 12 ships on each of so many days, from 20 January 2012 on.
+    fn fleet(days: i64) -> Vec<Observation> {
+        let first: TimeMs = "2012-01-20".parse().unwrap();
+        let place = |ship: i64, day: i64| Observation {
+            time: TimeMs::new(first.ms() + day * 86_400_000).unwrap(),
+            lon_deg: (10 * ship + day) as f64 / 10.0,
+            ..observation(&format!("ship-{ship:02}"), 1.0)
+        };
+        (0..12)
+            .flat_map(|ship| (0..days).map(move |day| place(ship, day)))
+            .collect()
+    }
+
+    #[tokio::test]
+    async fn ways_of_many_ships_are_read_once_and_are_those_of_each() {
+        let folder = tempfile::tempdir().unwrap();
+        let store = Store::open(folder.path().to_str().unwrap()).unwrap();
+        let (store, traffic) = store.counted();
+        let home = FileStore::new(store);
+        let rows = fleet(60);
+        home.upsert(&rows).await.unwrap();
+        let dataset = &rows[0].dataset;
+        // Last first, one of them twice, and one that is not there.
+        let names = (0..12).rev().chain([3, 99]);
+        let queries: Vec<_> = names
+            .map(|ship| TrackQuery {
+                limit: 20 + ship,
+                ..TrackQuery::new(dataset.clone(), format!("ship-{ship:02}"))
+            })
+            .collect();
+        let mut each = vec![];
+        for query in &queries {
+            each.push(home.track(query).await.unwrap());
+        }
+        assert!(each[0].len() > 15 && each[13].is_empty());
+        let reads = async |queries: &[TrackQuery], most: usize| {
+            let before = traffic.counts();
+            let tracks = home.tracks_holding(queries, most).await.unwrap();
+            (tracks, traffic.counts().since(before).reads)
+        };
+        let (_, reads_of_one) = reads(&queries[..1], MAX_HELD).await;
+        let (together, reads_of_all) = reads(&queries[..], MAX_HELD).await;
+        assert_eq!(together, each);
+        assert!(reads_of_one >= 3, "{reads_of_one}");
+        assert_eq!(reads_of_all, reads_of_one);
+        // More than can be held: in parts, with the same answers.
+        for most in [0, 200, 500] {
+            let (in_parts, reads_in_parts) = reads(&queries[..], most).await;
+            assert_eq!(in_parts, each, "{most}");
+            assert!(reads_in_parts > reads_of_all, "{most}");
         }
     }
 }

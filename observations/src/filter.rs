@@ -8,7 +8,7 @@ use crate::area::Area;
 use crate::key::Key;
 
 /// Most names in one list of a question.
-const MAX_NAMES: usize = 100;
+pub(crate) const MAX_NAMES: usize = 100;
 
 /// A page of rows that are one more than the limit if there is a next page.
 pub(crate) fn page(mut observations: Vec<Observation>, limit: u32) -> Page {

@@ -1,7 +1,7 @@
 //! Observations of buoys, ships, stations and profiles: kept and queried in PostGIS or in GeoParquet files.
 //!
 //! ```text
-//! observation events, observation files -> upsert -> [PostGIS | GeoParquet] -> query, platforms, track
+//! observation events, observation files -> upsert -> [PostGIS | GeoParquet] -> query, platforms, tracks
 //! ```
 //! One trait, [`ObservationStore`], and one suite of tests for both homes: the same calls give the same answers, byte for
 //! byte as JSON. Left out on purpose: reading files (ingest) and comparing with grids (compute).

@@ -89,6 +89,18 @@ impl ObservationStore for PostgisStore {
         rows.iter().map(row::track_point).collect()
     }
 
+    /// An index leads to the rows of each platform.
+    async fn tracks(
+        &self,
+        queries: &[TrackQuery],
+    ) -> Result<Vec<Vec<TrackPoint>>, ObservationError> {
+        let mut tracks = Vec::with_capacity(queries.len());
+        for query in queries {
+            tracks.push(self.track(query).await?);
+        }
+        Ok(tracks)
+    }
+
     async fn ready(&self) -> Result<(), ObservationError> {
         self.connections.ready().await
     }

@@ -49,6 +49,13 @@ pub trait ObservationStore: Send + Sync {
     /// The way of a platform in the order of time, one place for each time, thinned to the limit.
     async fn track(&self, query: &TrackQuery) -> Result<Vec<TrackPoint>, ObservationError>;
 
+    /// The ways of several platforms, each as [`Self::track`] has it, in the order of the questions. A home in files reads each file
+    /// once for those that stand side by side and are of one dataset and span of time, where their ways can be held together.
+    async fn tracks(
+        &self,
+        queries: &[TrackQuery],
+    ) -> Result<Vec<Vec<TrackPoint>>, ObservationError>;
+
     /// Can observations be stored and asked for now? Answers within two seconds.
     async fn ready(&self) -> Result<(), ObservationError>;
 }

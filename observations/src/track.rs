@@ -3,7 +3,7 @@
 use contract::ContractError;
 use contract::observation::{MAX_PLACES, TrackQuery};
 
-use crate::filter::{check_span, is_name};
+use crate::filter::{MAX_NAMES, check_span, is_name};
 
 /// Checks every limit of a question that came from outside.
 ///
@@ -25,6 +25,16 @@ pub(crate) fn check(query: &TrackQuery) -> Result<(), ContractError> {
     check_span(query.from, query.to)
 }
 
+/// Questions in their order, in parts that are about one dataset and one span of time, each of so many names as a filter may have.
+pub(crate) fn together(queries: &[TrackQuery]) -> Vec<&[TrackQuery]> {
+    let are_alike =
+        |a: &TrackQuery, b: &TrackQuery| (&a.dataset, a.from, a.to) == (&b.dataset, b.from, b.to);
+    queries
+        .chunk_by(are_alike)
+        .flat_map(|alike| alike.chunks(MAX_NAMES))
+        .collect()
+}
+
 /// Of a way from its first to its last place at most `limit` places: every n-th, n as small as may be, and the last.
 ///
 /// `question::track` says the same in SQL.
@@ -44,6 +54,21 @@ pub(crate) fn thinned<T>(way: Vec<T>, limit: u32) -> Vec<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn questions_about_one_dataset_and_time_are_asked_together() {
+        let of = |dataset: &str, year: &str| TrackQuery {
+            from: Some(year.parse().unwrap()),
+            ..TrackQuery::new(dataset.parse().unwrap(), "ship")
+        };
+        let mut all = vec![of("a", "2001"); 2 * MAX_NAMES + 1];
+        all.extend([of("a", "2002"), of("b", "2002"), of("b", "2002")]);
+        let parts = together(&all);
+        let sizes: Vec<_> = parts.iter().map(|part| part.len()).collect();
+        assert_eq!(sizes, [MAX_NAMES, MAX_NAMES, 1, 1, 2]);
+        assert_eq!(parts.concat(), all, "in their order");
+        assert!(together(&[]).is_empty());
+    }
 
     #[test]
     fn a_way_keeps_its_ends_and_no_more_than_its_limit_between() {

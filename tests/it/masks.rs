@@ -191,12 +191,37 @@ fn statistics_and_budgets_are_of_the_version_that_is_named() {
     let whole = versions[0]["manifest"].as_str().unwrap();
     let again = ["budget", "--json", "--product", whole];
     assert_eq!(program::json(data, &again).unwrap(), versions[0]);
+    for name in [whole, "flux@3"] {
+        let as_of = ["budget", "--json", "--product", "flux", "--as-of", name];
+        assert_eq!(program::json(data, &as_of).unwrap(), versions[0], "{name}");
+    }
+    let difference = |more: &str| {
+        let of = "stats difference --region 14n-50n --json --product";
+        program::json(data, &[&words(of)[..], &words(more)].concat()).unwrap()
+    };
+    let wanted = difference("flux@4 --minus flux@3");
+    for named in [
+        "flux --manifest flux@4 --minus-manifest flux@3".to_owned(),
+        format!("flux --manifest flux@4 --minus flux --minus-manifest {whole}"),
+    ] {
+        assert_eq!(difference(&named), wanted, "{named}");
+    }
     for (command, wanted) in [
         ("budget --product flux@9", "no version 9"),
         ("budget --product flux@1-00000000", "not flux@1-00000000"),
         ("budget --product flux@x", "flux@x"),
         ("budget --product flux@1 --as-of 2100", "give one"),
         ("budget --product flux@1 --history", "of all versions"),
+        ("budget --product flux --as-of flux@9", "no version 9"),
+        (
+            "budget --product flux --as-of flux@1-00000000",
+            "not flux@1-00000000",
+        ),
+        ("budget --product flux --as-of sst@1", "is none of flux"),
+        (
+            "stats difference --region global --product flux --minus-manifest flux",
+            "names no version",
+        ),
         (
             "stats polygon --region global --product flux@9",
             "no version 9",

@@ -201,8 +201,8 @@ pub trait Observe: Send + Sync + 'static {
     /// All data sets that there are observations of, by name.
     async fn datasets(&self) -> Result<Vec<ProductId>, BackendError>;
 
-    /// Where a platform was, in the order of time.
-    async fn track(&self, query: &TrackQuery) -> Result<Vec<TrackPoint>, BackendError>;
+    /// Where platforms were, each in the order of time, in the order of the questions.
+    async fn tracks(&self, queries: &[TrackQuery]) -> Result<Vec<Vec<TrackPoint>>, BackendError>;
 
     /// Observations in the order of time, and where to go on if there are more.
     async fn observations(&self, filter: &Filter) -> Result<Page, BackendError>;

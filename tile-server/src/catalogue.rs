@@ -165,7 +165,9 @@ impl Catalogue {
         as_of: &AsOf,
     ) -> Result<Arc<Layer>, ServerError> {
         let instant = match as_of {
-            AsOf::Version(id) => return self.version(product, Some(&id.to_string())).await,
+            AsOf::Version(named) => {
+                return self.version(product, Some(&named.to_string())).await;
+            }
             AsOf::Instant(instant) => *instant,
         };
         let newest = self.layer(product).await?;

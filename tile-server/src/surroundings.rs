@@ -46,7 +46,8 @@ pub(crate) struct SurroundingsQuery {
     /// How far a kilogram of accumulated carbon a square metre lifts particles, m m² kg⁻¹.
     #[param(value_type = Option<f64>, minimum = 0, maximum = 1e9)]
     height_exaggeration: Option<String>,
-    /// Where the light comes from: `AZIMUTH,ELEVATION` in degrees, or `time` for where the sun stood at the instant shown.
+    /// Where the light comes from: `AZIMUTH,ELEVATION` in degrees, 5 to 90 high, or `time` for where the sun stood at the instant
+    /// shown. Particles of map tiles are lit as by a sun no lower than 20 degrees.
     #[param(example = "315,40")]
     sun: Option<String>,
 }

@@ -63,7 +63,10 @@ fn with_unit(arguments: &[Expr]) -> Result<Expr> {
         return plan_err!("unit takes a number and a unit: unit(0.17, 'K')");
     };
     let Some(scaled) = Scaled::parse(unit) else {
-        return plan_err!("{unit:?} is no unit that is known here");
+        return plan_err!(
+            "{unit:?} is no unit that is known here; symbols stand with blanks between and their powers behind, as in \
+             unit(1, 'm s-1'), unit(20, 'mol m-2 year-1') or unit(5, 'hPa')"
+        );
     };
     let mut metadata = BTreeMap::from([(UNIT_KEY.to_owned(), scaled.unit.to_string())]);
     if scaled.offset != 0.0 {

@@ -142,6 +142,20 @@ fn no_comparison_with_what_is_no_number_is_true() {
 }
 
 #[test]
+fn units_that_the_reason_gives_as_forms_are_read() {
+    for form in [
+        "unit(1, 'm s-1')",
+        "unit(20, 'mol m-2 year-1')",
+        "unit(5, 'hPa')",
+        "unit(0.17, 'K')",
+    ] {
+        assert!(read(form).is_ok(), "{form}");
+    }
+    let unknown = read("nobody - unit(1, 'K')").map(|_| ()).unwrap_err();
+    assert!(!unknown.contains("single quotes"), "{unknown}");
+}
+
+#[test]
 fn mixed_units_and_whatever_is_no_arithmetic_are_refused_with_the_reason() {
     for (text, reason) in [
         ("sst + wind", "one is in K, the other in m s-1"),
@@ -162,6 +176,18 @@ fn mixed_units_and_whatever_is_no_arithmetic_are_refused_with_the_reason() {
         ("schmidt_wanninkhof2014(sst, ice)", "2 arguments are given"),
         ("sst > unit(280, 'K')", "it is a comparison"),
         ("unit(1, 'furlong') * sst", "no unit"),
+        ("unit(1,'m/s')", "as in unit(1, 'm s-1')"),
+        ("unit(1, 'm s^-1')", "as in unit(1, 'm s-1')"),
+        ("unit(1)", "a number and a unit: unit(0.17, 'K')"),
+        ("unit('K', 1)", "a number and a unit: unit(0.17, 'K')"),
+        (
+            "sst - unit(1, \"K\")",
+            "in single quotes, as in unit(0.17, 'K')",
+        ),
+        (
+            "sst - unit(1, K)",
+            "in single quotes, as in unit(0.17, 'K')",
+        ),
         (
             "sst - unit(0.17, 'degC')",
             "unit(0.17, 'degC') in arithmetic may be a temperature or a difference",

@@ -106,8 +106,8 @@ fn turned(mut corners: Vec<[f64; 2]>, against_the_clock: bool) -> Ring {
     Ring::new(corners)
 }
 
-/// Polygons in groups whose bounds meet, also some turns apart.
-fn groups(polygons: &[Checked]) -> Vec<Vec<usize>> {
+/// Polygons in groups whose bounds meet, also some turns apart: the numbers of those that [`united`] overlays together.
+pub(super) fn groups(polygons: &[Checked]) -> Vec<Vec<usize>> {
     let bounds = |polygon: &Checked| {
         let [west, south, east, north] = bounds_deg(polygon.rings().flatten());
         Rectangle::from_corners([west, south], [east, north])

@@ -6,15 +6,15 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::ContractError;
-use crate::manifest::ManifestId;
+use crate::manifest::{AskedVersion, ManifestId};
 use crate::product::ProductId;
 use crate::time::TimeMs;
 
 /// Which version is asked for: the one of a name, or the newest of an instant.
 #[derive(Debug, Clone, PartialEq)]
 pub enum AsOf {
-    /// By its name.
-    Version(ManifestId),
+    /// By its name, with or without its digest.
+    Version(AskedVersion),
     /// The newest that was published then.
     Instant(TimeMs),
 }
@@ -28,7 +28,7 @@ impl FromStr for AsOf {
         }
         s.parse().map(Self::Instant).map_err(|_no_time| {
             let reason = "use an instant such as 2026-03-01, which is its first moment (UTC), or a version as answers name \
-                          it, such as takahashi09-flux@12-0a1b2c3d";
+                          it, such as takahashi09-flux@12 or takahashi09-flux@12-0a1b2c3d";
             ContractError::invalid("version", s, reason)
         })
     }
@@ -107,11 +107,12 @@ mod tests {
     #[test]
     fn a_version_is_named_or_dated() {
         let of = |text: &str| text.parse::<AsOf>();
-        let id: ManifestId = "p@3-56d19b9b".parse().unwrap();
-        assert_eq!(of("p@3-56d19b9b"), Ok(AsOf::Version(id)));
+        for name in ["p@3-56d19b9b", "p@3"] {
+            assert_eq!(of(name), Ok(AsOf::Version(name.parse().unwrap())));
+        }
         let day = "2026-03-01T00:00:00Z".parse().unwrap();
         assert_eq!(of("2026-03-01"), Ok(AsOf::Instant(day)));
-        for bad in ["", "3", "p@3", "yesterday"] {
+        for bad in ["", "3", "p@", "p@x", "p@3-56", "yesterday"] {
             let refused = of(bad).unwrap_err().to_string();
             assert!(refused.contains('@'), "{bad}: {refused}");
         }

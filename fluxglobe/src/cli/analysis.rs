@@ -10,7 +10,7 @@ use contract::analysis::{
 };
 use contract::earth::Earth;
 use contract::grid::LonLatDeg;
-use contract::manifest::{AskedVersion, ManifestId};
+use contract::manifest::AskedVersion;
 use contract::statistics::MinCoverage;
 use contract::time::{TimeMs, TimeStep};
 
@@ -149,18 +149,18 @@ pub(crate) struct StatsDifference {
     /// Its years, both part of it: 2001/2005. All that it covers if absent.
     #[arg(long, value_name = "FIRST/LAST")]
     pub(crate) period: Option<BasePeriod>,
-    /// Its version, as answers name it, where --product names none. The newest if absent.
+    /// Its version, as answers name it, with or without its digest, where --product names none. The newest if absent.
     #[arg(long, value_name = "VERSION")]
-    pub(crate) manifest: Option<ManifestId>,
+    pub(crate) manifest: Option<AskedVersion>,
     /// Product that is taken off, and which of its versions. The same product, in its newest version, if absent.
     #[arg(long, value_name = "PRODUCT[@VERSION]")]
     pub(crate) minus: Option<AskedVersion>,
     /// Years that are taken off. The same ones if absent.
     #[arg(long, value_name = "FIRST/LAST")]
     pub(crate) minus_period: Option<BasePeriod>,
-    /// Version that is taken off, where --minus names none. The newest if absent.
+    /// Version that is taken off, as --manifest has it, where --minus names none. The newest if absent.
     #[arg(long, value_name = "VERSION")]
-    pub(crate) minus_manifest: Option<ManifestId>,
+    pub(crate) minus_manifest: Option<AskedVersion>,
     #[command(flatten)]
     pub(crate) place: Place,
     /// Least coverage, percent: steps of either that hold data over less of the region's sea, or of the line, are left out, and how many is

@@ -45,8 +45,8 @@ pub(crate) struct Budget {
     /// Natural Earth's land, 1:50 million, if absent.
     #[arg(long, value_name = "PRODUCT")]
     pub(crate) ocean: Option<ProductId>,
-    /// The newest version that was published at an instant (a day is its first moment, UTC), or one as answers name it,
-    /// PRODUCT@NUMBER-DIGEST, where --product names none. The newest of all if absent.
+    /// The newest version that was published at an instant (a day is its first moment, UTC), or one by its name, PRODUCT@NUMBER, or as
+    /// answers name it, PRODUCT@NUMBER-DIGEST, where --product names none. The newest of all if absent.
     #[arg(long, value_name = "DATE|VERSION")]
     pub(crate) as_of: Option<AsOf>,
     /// One line for each version of the product that changed the budget, with its date and what it changed; of the total, without

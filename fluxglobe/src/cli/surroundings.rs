@@ -62,7 +62,8 @@ pub(crate) struct Surroundings {
     #[arg(long, help_heading = HEADING, allow_negative_numbers = true, value_name = "METRES")]
     pub(crate) height_exaggeration: Option<f64>,
     /// `time`: the real sun of the instant, with day and night; or its place in the sky in degrees,
-    /// AZIMUTH,ELEVATION, as in `--sun 135,30`; 315,40 if absent.
+    /// AZIMUTH,ELEVATION, as in `--sun 135,30`, 5 to 90 high; 315,40 if absent. Particles of map tiles are lit as by a sun no lower
+    /// than 20 degrees.
     #[arg(long, help_heading = HEADING, value_name = "time|AZIMUTH,ELEVATION")]
     pub(crate) sun: Option<SunChoice>,
 }

@@ -8,7 +8,7 @@ use anyhow::{Result, bail};
 use compute::Engine;
 use contract::analysis::{AnalysisOptions, Hovmoller, HovmollerWishes, SeriesQuery};
 use contract::cited::Cited;
-use contract::manifest::{AskedVersion, Manifest, ManifestId};
+use contract::manifest::{AskedVersion, Manifest};
 use contract::time::{Period, TimeMs};
 use storage::Store;
 
@@ -150,16 +150,19 @@ async fn version(
     settings: &Settings,
     store: &Store,
     asked: &AskedVersion,
-    named: Option<&ManifestId>,
+    named: Option<&AskedVersion>,
 ) -> Result<Manifest> {
     match named {
         None => deployment::version(store, asked, &settings.data).await,
-        Some(id) if asked.number.is_some() => {
-            bail!("{asked} and {id} both say which version is meant: give one")
+        Some(named) if asked.number.is_some() => {
+            bail!("{asked} and {named} both say which version is meant: give one")
         }
-        Some(id) if id.product != asked.product => {
-            bail!("version {id} is none of {}", asked.product)
+        Some(named) if named.product != asked.product => {
+            bail!("version {named} is none of {}", asked.product)
         }
-        Some(id) => Ok(storage::manifests::load(store, id).await?),
+        Some(named) if named.number.is_none() => {
+            bail!("{named} names no version: give its number too, such as {named}@12")
+        }
+        Some(named) => deployment::version(store, named, &settings.data).await,
     }
 }

@@ -70,10 +70,10 @@ async fn version(settings: &Settings, store: &Store, options: &Budget) -> Result
         Some(_) if asked.number.is_some() => {
             bail!("--product {asked} and --as-of both say which version is meant: give one")
         }
-        Some(AsOf::Version(id)) if id.product != *product => {
-            bail!("version {id} is none of {product}")
+        Some(AsOf::Version(named)) if named.product != *product => {
+            bail!("version {named} is none of {product}")
         }
-        Some(AsOf::Version(id)) => Ok(manifests::load(store, id).await?),
+        Some(AsOf::Version(named)) => deployment::version(store, named, &settings.data).await,
         Some(AsOf::Instant(instant)) => match manifests::as_of(store, product, *instant).await? {
             AtInstant::Version(manifest) => Ok(*manifest),
             AtInstant::BeforeFirst(first) => {

@@ -21,8 +21,8 @@ impl Observe for Observer {
         self.0.datasets().await.map_err(failed)
     }
 
-    async fn track(&self, query: &TrackQuery) -> Result<Vec<TrackPoint>, BackendError> {
-        self.0.track(query).await.map_err(failed)
+    async fn tracks(&self, queries: &[TrackQuery]) -> Result<Vec<Vec<TrackPoint>>, BackendError> {
+        self.0.tracks(queries).await.map_err(failed)
     }
 
     async fn observations(&self, filter: &Filter) -> Result<Page, BackendError> {

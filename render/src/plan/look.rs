@@ -23,7 +23,8 @@ pub(super) const MAP_ALPHA: f32 = 0.9;
 pub(super) const OBLIQUE: f64 = 0.35;
 /// Largest particle, pixels: keeps positions and reaches far inside 32-bit integers.
 pub(super) const MAX_RADIUS_PX: f32 = 100_000.0;
-/// Shadows of a lower sun would fall far beyond a tile.
+/// Shadows of a lower sun would fall far beyond a tile: particles of map tiles are lit as by this one, which the descriptions of the sun
+/// in addresses and on the command line say.
 pub(super) const LOWEST_SUN_DEG: f64 = 20.0;
 /// Light texel over particle radius: depositing and looking up with hats of this width blurs as much as the
 /// particle's own kernel does (variance texel²/3 against radius²/8).

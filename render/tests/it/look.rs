@@ -211,3 +211,23 @@ fn uncertainty_is_seen_where_gaps_were_filled_and_nowhere_else() {
         );
     }
 }
+
+/// What the descriptions of the sun say.
+#[test]
+fn particles_of_tiles_are_lit_by_no_sun_below_20_degrees_and_those_of_globes_are() {
+    let scene = ocean(FIVE_DEGREES);
+    for renderer in renderers("low sun") {
+        let lit = |view: View, elevation_deg: f64| {
+            let job = styled(Mode::Volume, view, |style| {
+                style.sun.elevation_deg = elevation_deg;
+            });
+            renderer.render(&job, &scene).unwrap()
+        };
+        let flat = tile(1, 0, 0, 256);
+        let at_20 = lit(flat, 20.0);
+        assert!(lit(flat, 5.0) == at_20, "{}", renderer.name());
+        assert!(lit(flat, 30.0) != at_20, "{}", renderer.name());
+        let round = globe(-120.0, 10.0, 1.5e7, 160);
+        assert!(lit(round, 5.0) != lit(round, 20.0), "{}", renderer.name());
+    }
+}

@@ -22,7 +22,7 @@ use crate::state::AppState;
 const MOST_PLATFORMS: u32 = 10_000;
 /// Places of one track; more are thinned out by the observation store.
 const TRACK_POINTS: u32 = 2000;
-/// Tracks of one answer: each is a question of its own.
+/// Tracks of one answer: one question is about all of them.
 const MOST_TRACKS: usize = 50;
 
 #[derive(Debug, Deserialize, IntoParams)]
@@ -124,24 +124,24 @@ pub(crate) async fn get(
         .enter()
         .await
         .inspect_err(|_busy| state.metrics.refused.inc())?;
-    let mut features = vec![];
-    let mut tracks = 0;
     let found = observer.platforms(&filter).await?;
     if let (true, [dataset]) = (found.platforms.is_empty(), filter.datasets.as_slice()) {
         check_dataset(observer.as_ref(), dataset).await?;
     }
-    for platform in found.platforms {
-        let track = if platform.kind == PlatformKind::Ship && tracks < MOST_TRACKS {
-            tracks += 1;
-            track(observer.as_ref(), &platform, &filter).await?
+    let mut tracks = tracks(observer.as_ref(), &found.platforms, &filter)
+        .await?
+        .into_iter();
+    let with_track = |platform: Platform| {
+        let track = if platform.kind == PlatformKind::Ship {
+            tracks.next().unwrap_or_default()
         } else {
             vec![]
         };
-        features.push(feature(platform, &track));
-    }
+        feature(platform, &track)
+    };
     let answer = Platforms {
         kind: Collection::FeatureCollection,
-        features,
+        features: found.platforms.into_iter().map(with_track).collect(),
         is_complete: found.is_complete,
     };
     Ok(([(header::CACHE_CONTROL, "no-cache")], Json(answer)).into_response())
@@ -170,18 +170,26 @@ impl PlatformParameters {
     }
 }
 
-async fn track(
+/// Tracks of the first ships among platforms, in their order.
+async fn tracks(
     observer: &dyn Observe,
-    platform: &Platform,
+    platforms: &[Platform],
     filter: &Filter,
-) -> Result<Vec<TrackPoint>, ServerError> {
-    let query = TrackQuery {
+) -> Result<Vec<Vec<TrackPoint>>, ServerError> {
+    let query = |platform: &Platform| TrackQuery {
         from: filter.from,
         to: filter.to,
         limit: TRACK_POINTS,
         ..TrackQuery::new(platform.dataset.clone(), platform.platform.as_str())
     };
-    Ok(observer.track(&query).await?)
+    let ships = platforms
+        .iter()
+        .filter(|platform| platform.kind == PlatformKind::Ship);
+    let queries: Vec<TrackQuery> = ships.take(MOST_TRACKS).map(query).collect();
+    if queries.is_empty() {
+        return Ok(vec![]);
+    }
+    Ok(observer.tracks(&queries).await?)
 }
 
 fn feature(platform: Platform, track: &[TrackPoint]) -> PlatformFeature {

@@ -107,6 +107,8 @@ async fn many_buoys_take_no_ship_its_track_but_there_is_a_limit() {
     let tracks = (0..200).filter(|number| is_track(*number)).count();
     assert_eq!(tracks, 50);
     assert!(is_track(80) && is_track(129) && !is_track(130));
+    let fleets = app.observer.fleets.lock().unwrap();
+    assert_eq!(*fleets, [50], "one question about all of them");
 }
 
 #[tokio::test]

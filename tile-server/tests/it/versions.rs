@@ -96,6 +96,10 @@ async fn series_and_budgets_tell_the_version_that_was_asked_for() {
         for name in [old.as_str().unwrap(), "flux@1"] {
             let named = format!("{path}manifest={name}");
             assert_eq!(app.get(&named).await.json()["manifest"], old);
+            if path.contains("/budget") {
+                let as_of = format!("{path}as_of={name}");
+                assert_eq!(app.get(&as_of).await.json()["manifest"], old);
+            }
         }
         for (name, status) in [
             ("flux@3", 404),

@@ -338,6 +338,13 @@ pub(crate) async fn a_track_has_one_place_for_each_time(home: &Home) {
         ..query
     };
     assert!(lons(&nobody).await.is_empty());
+    let asked = [two, nobody, late];
+    let together = store.tracks(&asked).await.unwrap();
+    assert_eq!(together.len(), asked.len());
+    for (query, track) in asked.iter().zip(together) {
+        assert_eq!(track, store.track(query).await.unwrap(), "{query:?}");
+    }
+    assert!(store.tracks(&[]).await.unwrap().is_empty());
 }
 
 pub(crate) async fn a_long_track_is_thinned_and_ends_where_it_ends(home: &Home) {
