@@ -9,6 +9,7 @@ mod prior;
 mod source;
 mod statistic;
 mod steps;
+mod with_data;
 
 use contract::digest::Digest;
 use contract::event::Body;
@@ -54,7 +55,8 @@ pub type Progress<'a> = dyn Fn(DeriveProgress) + Send + Sync + 'a;
 
 /// Derives the product of a flux product's accumulated carbon, kg m⁻², from `start` (the product's own if absent) on.
 ///
-/// A step's values hold at its end. A gap in time leaves a cell as it was; a cell without data in any step holds none.
+/// A step's values hold at its end. A gap in time leaves a cell as it was, and before its first data at 0; a cell without data in any step
+/// from `start` on holds none.
 /// If the newest version was derived from the same version of the source and the same start, it is returned as it is;
 /// else only the steps from the first changed one on are computed.
 /// [`derived`] is the event to tell of it, after the manifest.

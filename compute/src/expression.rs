@@ -10,7 +10,7 @@ mod typed;
 pub(crate) mod udf;
 pub mod unit;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, LazyLock};
 
@@ -220,6 +220,16 @@ impl Expression {
             ))),
         }
     }
+}
+
+/// Of the names of its inputs, those whose values an expression computes with, and does not only compare; all of one that cannot be read.
+pub(crate) fn computed_with(text: &str, names: &[&str]) -> BTreeSet<String> {
+    let field = |name: &&str| Field::new(*name, DataType::Float64, true);
+    let schema = Schema::new(names.iter().map(field).collect::<Vec<_>>());
+    let found = DFSchema::try_from(Arc::new(schema))
+        .and_then(|schema| STATE.create_logical_expr(text, &schema))
+        .and_then(|parsed| rewrite::computed_with(&parsed));
+    found.unwrap_or_else(|_unread| names.iter().map(|name| (*name).to_owned()).collect())
 }
 
 /// What is wrong with a name that is no input, if that is what is wrong.

@@ -23,6 +23,7 @@ mod region_sums;
 pub(crate) mod remembered;
 mod remembered_shares;
 mod run;
+mod scales;
 mod step_means;
 mod stored;
 pub(crate) mod task;

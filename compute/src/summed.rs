@@ -1,9 +1,11 @@
 //! What may be summed over area and time, a flux of carbon and no extreme of one; and what may be averaged, no days of a year that goes round
 //! and, on the way to another grid, no codes.
 
+use std::collections::BTreeSet;
+
 use contract::ContractError;
 use contract::analysis::MapStatistic;
-use contract::computed::Regridding;
+use contract::computed::{Computation, ComputedInput, Matching, Regridding};
 use contract::manifest::Manifest;
 use contract::quantity::Quantity;
 use contract::statistics::Percentile;
@@ -11,6 +13,7 @@ use storage::manifests::OverTime;
 use storage::{Store, manifests};
 
 use crate::ComputeError;
+use crate::expression::computed_with;
 
 /// Has a product budgets, and is carbon accumulated of it?
 ///
@@ -28,17 +31,80 @@ pub async fn has_budget(store: &Store, manifest: &Manifest) -> Result<bool, Comp
 }
 
 /// # Errors
-/// `NotSummed` of the highest or lowest values or a percentile of each cell, and of these on another grid or averaged: cells of which each has
-/// its value from another time were never there together.
+/// `NotSummed` of the highest or lowest values or a percentile of each cell, of these on another grid or averaged, and of what an expression
+/// computes with any of them: cells of which each has its value from another time were never there together.
 pub(crate) async fn check_summed(store: &Store, manifest: &Manifest) -> Result<(), ComputeError> {
-    let over_time = manifests::over_time(store, manifest).await?;
-    match over_time.filter(OverTime::is_extreme) {
-        Some(OverTime { statistic, of }) => Err(ComputeError::NotSummed {
-            product: manifest.product.clone(),
-            what: in_words(statistic),
-            of,
-        }),
-        None => Ok(()),
+    let mut seen = BTreeSet::from([manifest.product.clone()]);
+    let mut behind: Option<Behind> = None;
+    let mut left = vec![];
+    loop {
+        let own = behind.as_ref().map_or(manifest, |behind| &behind.manifest);
+        let is_computed_with = behind
+            .as_ref()
+            .is_some_and(|behind| behind.is_computed_with);
+        let over_time = manifests::over_time(store, own).await?;
+        if let Some(OverTime { statistic, of }) = over_time.filter(OverTime::is_extreme) {
+            let what = in_words(statistic);
+            return Err(ComputeError::NotSummed {
+                product: manifest.product.clone(),
+                what: if is_computed_with {
+                    format!("result of an expression over the {what}")
+                } else {
+                    what
+                },
+                of,
+            });
+        }
+        for input in passed_on(own) {
+            let found = manifests::of_kind(store, &input.manifest).await?;
+            let found = found.filter(|found| seen.insert(found.product.clone()));
+            left.extend(found.map(|manifest| Behind {
+                is_computed_with: is_computed_with || is_expression(own),
+                manifest,
+            }));
+        }
+        behind = left.pop();
+        if behind.is_none() {
+            return Ok(());
+        }
+    }
+}
+
+/// A version whose values went into those of another.
+struct Behind {
+    manifest: Manifest,
+    /// Does an expression lie between them?
+    is_computed_with: bool,
+}
+
+fn is_expression(manifest: &Manifest) -> bool {
+    let how = manifest.computed.as_ref().map(|computed| &computed.how);
+    matches!(how, Some(Computation::Expression { .. }))
+}
+
+/// Inputs whose values are those of a version still, or make them.
+fn passed_on(manifest: &Manifest) -> Vec<&ComputedInput> {
+    let Some(computed) = &manifest.computed else {
+        return vec![];
+    };
+    let inputs = computed.inputs.iter();
+    match &computed.how {
+        Computation::Expression { expression } => {
+            let names: Vec<&str> = inputs.clone().map(|input| input.name.as_str()).collect();
+            let names = computed_with(expression, &names);
+            // Extremes have one step: what is of several steps, and of the same ones, is of none.
+            let may_be_one = |input: &&ComputedInput| {
+                manifest.steps.len() == 1 || input.matching != Matching::SamePeriod
+            };
+            let own = inputs.filter(|input| names.contains(&input.name));
+            own.filter(may_be_one).collect()
+        }
+        Computation::Regrid { .. }
+        | Computation::Statistic {
+            statistic: MapStatistic::Mean | MapStatistic::Climatology,
+            ..
+        } => inputs.collect(),
+        Computation::Statistic { .. } | Computation::Correlation { .. } => vec![],
     }
 }
 

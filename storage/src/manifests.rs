@@ -16,7 +16,7 @@ use contract::product::ProductId;
 use crate::sound::damage;
 use crate::{StorageError, Store, document, fields};
 
-pub use over_time::{OverTime, over_time};
+pub use over_time::{OverTime, of_kind, over_time};
 pub use published::{AtInstant, as_of, published};
 
 /// Versions that were published since the last look, up to which each is asked for.

@@ -12,6 +12,7 @@ use super::carried::{Carried, CarriedBand};
 use super::prior::Prior;
 use super::source::SourceStep;
 use super::steps::{Band, accumulate_segment, sums_after};
+use super::with_data::with_data;
 use super::{Progress, exact, of_all};
 use crate::workshop::Workshop;
 use crate::{ComputeError, Engine};
@@ -41,16 +42,11 @@ impl<'a> Derivation<'a> {
         latest: Option<&'a Manifest>,
     ) -> Result<Self, ComputeError> {
         let (store, grid) = (workshop.store, &source.grid);
-        let cells = domain::read_cells(store, &source.domain).await?;
-        if cells.map_count() != grid.cell_count() {
-            return Err(ComputeError::inconsistent(
-                source.domain.to_string(),
-                "it does not fill its product's grid",
-            ));
-        }
-        let domain = domain::write_cells(store, target, cells.clone()).await?;
-        let mut prior = Prior::of(store, latest, grid, steps, &domain).await?;
+        let mut prior = Prior::of(latest, grid, steps);
         let counts = prior.contributed(store, grid).await?;
+        let cells = with_data(workshop, source, steps, &prior).await?;
+        let domain = domain::write_cells(store, target, cells.clone()).await?;
+        prior.over_domain(store, &domain).await?;
         let start = steps.first().map(|step| step.period.start);
         let start = start.expect("there is a step to accumulate");
         let mut begun = Self {

@@ -32,31 +32,31 @@ impl<'a> Prior<'a> {
     }
 
     /// What of the newest manifest can be kept.
-    pub(super) async fn of(
-        store: &Store,
-        latest: Option<&'a Manifest>,
-        grid: &Grid,
-        steps: &[SourceStep<'_>],
-        domain_now: &ObjectKey,
-    ) -> Result<Self, ComputeError> {
-        let nothing = Self::nothing();
+    pub(super) fn of(latest: Option<&'a Manifest>, grid: &Grid, steps: &[SourceStep<'_>]) -> Self {
         let Some(latest) = latest.filter(|latest| latest.grid == *grid) else {
-            return Ok(nothing);
+            return Self::nothing();
         };
         let equal = |(old, new): &(&Step, &SourceStep<'_>)| {
             old.raw_sha256 == new.made_of && old.period == new.period && old.contributed.is_some()
         };
-        let step_count = latest.steps.iter().zip(steps).take_while(equal).count();
-        let other_domain = if latest.domain == *domain_now {
-            None
-        } else {
-            Some(domain::read_cells(store, &latest.domain).await?)
-        };
-        Ok(Self {
+        Self {
             manifest: Some(latest),
-            step_count,
-            other_domain,
-        })
+            step_count: latest.steps.iter().zip(steps).take_while(equal).count(),
+            other_domain: None,
+        }
+    }
+
+    /// Goes on over the domain of now: kept steps of another one are stored anew over it.
+    pub(super) async fn over_domain(
+        &mut self,
+        store: &Store,
+        domain_now: &ObjectKey,
+    ) -> Result<(), ComputeError> {
+        let before = self.manifest.map(|manifest| &manifest.domain);
+        if let Some(before) = before.filter(|before| *before != domain_now) {
+            self.other_domain = Some(domain::read_cells(store, before).await?);
+        }
+        Ok(())
     }
 
     /// What the sums after the last kept step hold; none before the first step, if none is kept. If the object is

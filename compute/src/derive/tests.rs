@@ -88,6 +88,15 @@ const WHOLE: Cut = (1 << 30, 1 << 40);
 const CUT: Cut = (1, 2);
 
 async fn derived(store: &Store, source: &Manifest, prior: Option<&Manifest>, cut: Cut) -> Manifest {
+    derived_since(store, source, (None, prior), cut).await
+}
+
+async fn derived_since(
+    store: &Store,
+    source: &Manifest,
+    (start, prior): (Option<TimeMs>, Option<&Manifest>),
+    cut: Cut,
+) -> Manifest {
     let one = NonZeroUsize::new(2).unwrap();
     let engine = Engine::in_process(store.clone(), one);
     let workshop = Workshop {
@@ -95,7 +104,7 @@ async fn derived(store: &Store, source: &Manifest, prior: Option<&Manifest>, cut
         run_values: cut.1,
         ..Workshop::of(store)
     };
-    let steps = steps_since(source, None).unwrap();
+    let steps = steps_since(source, start).unwrap();
     let made = accumulated((&engine, workshop), source, &steps, prior, &|_progress| ());
     made.await.unwrap()
 }
@@ -161,6 +170,50 @@ async fn what_was_accumulated_in_bands_is_gone_on_from_over_a_domain_that_grew()
             }
         }
         let made = derived(&store, &source, Some(&prior), then).await;
+        assert!(seen(&store, &made).await == expected, "{first:?} {then:?}");
+    }
+}
+
+fn is_early(cell: usize) -> bool {
+    cell / 130 < 40 && cell % 130 < 60
+}
+
+/// A flux of the first month alone in the north-west, and of the fourth on in the south-east.
+fn early_or_late(step: usize, cell: usize) -> f32 {
+    if is_early(cell) && step > 0 {
+        f32::NAN
+    } else {
+        flux(step, cell)
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_cell_without_data_since_the_start_has_accumulated_nothing_and_holds_none() {
+    let start = Some(Period::month(2001, 2).unwrap().start);
+    let (_folder, store) = folder_store();
+    let source = landed(&store, &GRID, 5, early_or_late).await;
+    let whole = derived_since(&store, &source, (start, None), WHOLE).await;
+    assert_ne!(whole.domain, source.domain);
+    let late = 120 * 130 + 100;
+    for (index, step) in whole.steps.iter().enumerate() {
+        let values = storage::fields::read(&store, &step.field, &GRID)
+            .await
+            .unwrap();
+        let mut early = (0..GRID.cell_count()).filter(|cell| is_early(*cell));
+        assert!(early.all(|cell| values[cell].is_nan()), "{index}");
+        // A gap before the first data of a cell is no growth yet.
+        assert!(!values[late].is_nan());
+        let valid = values.iter().filter(|value| !value.is_nan()).count();
+        assert_eq!(valid as u64, step.valid_cells);
+    }
+    // In parts, and gone on from what was there, it is the same.
+    let expected = seen(&store, &whole).await;
+    for (first, then) in [(CUT, CUT), (WHOLE, CUT), (CUT, WHOLE)] {
+        let (_folder, store) = folder_store();
+        let early = landed(&store, &GRID, 3, early_or_late).await;
+        let prior = derived_since(&store, &early, (start, None), first).await;
+        let source = landed(&store, &GRID, 5, early_or_late).await;
+        let made = derived_since(&store, &source, (start, Some(&prior)), then).await;
         assert!(seen(&store, &made).await == expected, "{first:?} {then:?}");
     }
 }

@@ -186,3 +186,25 @@ pub(super) fn required(expr: &Expr) -> Result<std::collections::BTreeSet<String>
     })?;
     Ok(found)
 }
+
+/// Columns whose values the result is computed with: all but those that are compared alone.
+pub(super) fn computed_with(expr: &Expr) -> Result<std::collections::BTreeSet<String>> {
+    let mut found = std::collections::BTreeSet::new();
+    expr.apply(|expr| {
+        match expr {
+            Expr::Column(column) => {
+                found.insert(column.name.clone());
+            }
+            Expr::Case(case) => {
+                let branches = case.when_then_expr.iter().map(|(_, then)| then);
+                for then in branches.chain(&case.else_expr) {
+                    found.extend(computed_with(then)?);
+                }
+                return Ok(TreeNodeRecursion::Jump);
+            }
+            _ => {}
+        }
+        Ok(TreeNodeRecursion::Continue)
+    })?;
+    Ok(found)
+}

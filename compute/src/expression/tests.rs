@@ -248,3 +248,19 @@ fn inputs_and_results_of_other_units_are_of_si_in_between() {
         assert_eq!(Scaled::kept(other), None, "{other}");
     }
 }
+
+#[test]
+fn what_is_compared_alone_is_not_computed_with() {
+    let of = |text: &str| {
+        let found = computed_with(text, &["a", "b", "c"]);
+        found.into_iter().collect::<Vec<_>>().join(" ")
+    };
+    assert_eq!(of("a * 0.5 + abs(b)"), "a b");
+    assert_eq!(
+        of("CASE WHEN a > 0 AND c BETWEEN 1 AND 2 THEN b ELSE 0 END"),
+        "b"
+    );
+    assert_eq!(of("2 * CASE WHEN a > b THEN 1 ELSE c END"), "c");
+    assert_eq!(of("coalesce(a, c)"), "a c");
+    assert_eq!(of("no ("), "a b c");
+}

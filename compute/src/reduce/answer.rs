@@ -17,10 +17,11 @@ use cube::scale::Scale;
 use futures::future::BoxFuture;
 
 use super::accumulator::{Accumulated, too_large};
-use super::bins::{BinSums, bin_sums};
+use super::bins::{BinSums, bin_sums, times};
 use super::percentiles::Searches;
-use super::question::{Question, Wanted};
+use super::question::{Piece, Question, Wanted};
 use super::run::{changed_meanwhile, opened, run};
+use super::scales::{Extremes, between, small_bins};
 use super::tasks::Version;
 use super::weighed::Weighed;
 use crate::budget::rows::coverage_percent;
@@ -63,14 +64,13 @@ pub fn statistics_of<'a>(
         let weighed = Weighed::of(engine, manifest, query).await?;
         let inside = (window, inside.len());
         let asked = Reduction::of(engine, (manifest, &id), &weighed, inside).await?;
-        let sums = asked.accumulated(wanted(query)).await?;
-        let bins = bin_sums(&periods, &bins, &sums).ok_or_else(too_large)?;
+        let (bins, scales) = asked.summed(&periods, &bins, wanted(query)).await?;
         let percentiles = asked.percentiles(query, &bins, &periods).await?;
         let rows = Rows {
             query,
             weighed: &weighed,
             display: manifest.quantity.display(),
-            scale: asked.scale,
+            scales: &scales,
             steps: &periods,
             percentiles: &percentiles,
         };
@@ -154,9 +154,11 @@ pub(super) struct Reduction<'a> {
     values: Option<Values>,
     weighed: &'a Weighed,
     /// Steps that reach into the period.
-    pub(super) steps: Range<u32>,
+    steps: Range<u32>,
     /// What values are summed in.
-    pub(super) scale: Scale,
+    scale: Scale,
+    /// Of a quantity that says nothing of its values, where they lie in every step.
+    extremes: Extremes,
 }
 
 impl<'a> Reduction<'a> {
@@ -178,37 +180,80 @@ impl<'a> Reduction<'a> {
             weighed,
             steps: first as u32..(first + count) as u32,
             scale: Scale::of_all(),
+            extremes: Extremes::new(),
         };
-        own.scale = match Scale::of(manifest.quantity) {
-            Some(of_quantity) => of_quantity,
-            None => own.own_scale().await?,
-        };
+        if let Some(of_quantity) = Scale::of(manifest.quantity) {
+            own.scale = of_quantity;
+            return Ok(own);
+        }
+        own.extremes = own.found_extremes().await?;
+        if let Some((low, high)) = between(own.extremes.values().copied()) {
+            own.scale = Scale::over((low.into(), high.into()));
+        }
         Ok(own)
     }
 
-    /// Passes over the values. Sums of whole runs are remembered, and not asked for a second time.
-    pub(super) async fn accumulated(&self, wanted: Wanted) -> Result<Accumulated, ComputeError> {
-        let weighed = self.weighed;
-        let version = Version {
+    /// Sums of every bin, and the scale that each is in: that of all values, or one of its own where its values are far below the largest of
+    /// all, which takes another pass over their steps.
+    pub(super) async fn summed(
+        &self,
+        periods: &[Period],
+        bins: &[Period],
+        wanted: Wanted,
+    ) -> Result<(Vec<BinSums>, Vec<Scale>), ComputeError> {
+        let found = self.accumulated(wanted.clone()).await?;
+        let mut sums = bin_sums(periods, bins, &found).ok_or_else(too_large)?;
+        let mut scales = vec![self.scale; bins.len()];
+        if self.extremes.is_empty() {
+            return Ok((sums, scales));
+        }
+        let steps_of = bins.iter().map(|bin| times(periods, *bin).1);
+        let steps_of = steps_of.map(|times| times.into_iter().map(|(step, _)| step).collect());
+        let steps_of: Vec<Vec<u32>> = steps_of.collect();
+        for small in small_bins(&self.extremes, &steps_of) {
+            let question = self.question(small.scale, wanted.clone());
+            // Runs along time are read whole, with larger values in them.
+            let fields = self.fields_alone(small.steps.iter().copied());
+            let found = self.of_fields(question, fields).await?;
+            let periods_of: Vec<Period> = small.bins.iter().map(|bin| bins[*bin]).collect();
+            let own = bin_sums(periods, &periods_of, &found).ok_or_else(too_large)?;
+            for (bin, own) in small.bins.into_iter().zip(own) {
+                (sums[bin], scales[bin]) = (own, small.scale);
+            }
+        }
+        Ok((sums, scales))
+    }
+
+    fn version(&self) -> Version<'_> {
+        Version {
             store: self.engine.store(),
             manifest: self.manifest,
             id: self.id,
             values: self.values.as_ref(),
-        };
+        }
+    }
+
+    fn question(&self, scale: Scale, wanted: Wanted) -> Question {
+        let weighed = self.weighed;
         let [whole, covered] = weighed.addresses.clone();
-        let question = Question {
+        Question {
             version: self.id.clone(),
             shape: weighed.shape,
             whole,
             covered,
             unit: weighed.unit,
-            scale: self.scale,
+            scale,
             wanted,
-        };
+        }
+    }
+
+    /// Passes over the values. Sums of whole runs are remembered, and not asked for a second time.
+    pub(super) async fn accumulated(&self, wanted: Wanted) -> Result<Accumulated, ComputeError> {
+        let (version, question) = (self.version(), self.question(self.scale, wanted));
         let known = self.engine.objects().remembered();
         let (mut all, mut pieces, mut new) = (Accumulated::default(), vec![], vec![]);
         let (stored, own_name) = (question.in_stored_sums(), question.sums_name());
-        for run in version.runs(self.steps.clone(), &weighed.cells(), stored) {
+        for run in version.runs(self.steps.clone(), &self.weighed.cells(), stored) {
             let name = run.name.zip(own_name);
             let name = name.map(|names| Digest::of_json(&names));
             if let Some(sums) = name.and_then(|name| known.get(&name)) {
@@ -223,7 +268,8 @@ impl<'a> Reduction<'a> {
         if !pieces.is_empty() {
             let values = self.values.clone();
             let Some(found) = run(self.engine, question.clone(), values, pieces).await? else {
-                return self.of_fields_alone(version, question).await;
+                let fields = self.fields_alone(self.steps.clone());
+                return self.of_fields(question, fields).await;
             };
             all.merge(found)?;
         }
@@ -235,38 +281,30 @@ impl<'a> Reduction<'a> {
         Ok(all)
     }
 
+    fn fields_alone(&self, steps: impl Iterator<Item = u32>) -> Vec<Piece> {
+        self.version().fields_alone(steps, &self.weighed.cells())
+    }
+
     /// The same of fields alone, which never change.
-    async fn of_fields_alone(
+    async fn of_fields(
         &self,
-        version: Version<'_>,
         question: Question,
+        fields: Vec<Piece>,
     ) -> Result<Accumulated, ComputeError> {
-        let fields = Version {
-            values: None,
-            ..version
-        };
-        let runs = fields.runs(self.steps.clone(), &self.weighed.cells(), None);
-        let pieces = runs.into_iter().flat_map(|run| run.pieces).collect();
-        let found = run(self.engine, question, None, pieces).await?;
+        let found = run(self.engine, question, None, fields).await?;
         found.ok_or_else(changed_meanwhile)
     }
 
-    /// The scale of the values that there are, of a quantity that says nothing of them.
-    async fn own_scale(&self) -> Result<Scale, ComputeError> {
+    /// Where the values of every step lie that there are, also of steps that are read along with those that were asked for.
+    async fn found_extremes(&self) -> Result<Extremes, ComputeError> {
         let wanted = Wanted::Sums {
             with_squares: false,
             with_extremes: true,
         };
         let found = self.accumulated(wanted).await?;
-        let range = (f32::INFINITY, f32::NEG_INFINITY);
-        let (low, high) = found.steps.values().fold(range, |(low, high), sums| {
-            (low.min(sums.min), high.max(sums.max))
-        });
-        Ok(if low <= high {
-            Scale::over((low.into(), high.into()))
-        } else {
-            Scale::of_all()
-        })
+        let own = found.steps.iter();
+        let own = own.map(|(step, sums)| (*step, (sums.min, sums.max)));
+        Ok(own.filter(|(_, (min, max))| min <= max).collect())
     }
 
     /// The percentiles of every bin that are asked for, stored unit.
@@ -293,7 +331,8 @@ struct Rows<'a> {
     query: &'a StatisticsQuery,
     weighed: &'a Weighed,
     display: Display,
-    scale: Scale,
+    /// What each bin was summed in.
+    scales: &'a [Scale],
     steps: &'a [Period],
     percentiles: &'a BTreeMap<(usize, Percentile), f32>,
 }
@@ -334,9 +373,9 @@ impl Rows<'_> {
 
     /// A statistic of a bin that holds data.
     fn value(&self, statistic: Statistic, at: usize, bin: &BinSums) -> Option<f64> {
-        let sums = &bin.sums;
+        let (sums, scale) = (&bin.sums, self.scales[at]);
         let shown = |value: f64| value * self.display.factor + self.display.offset;
-        let mean = || shown(self.scale.mean(sums.sum, sums.weight));
+        let mean = || shown(scale.mean(sums.sum, sums.weight));
         match statistic {
             Statistic::Mean => Some(mean()),
             Statistic::Sum => {
@@ -346,7 +385,7 @@ impl Rows<'_> {
             Statistic::Min => Some(shown(sums.min.into())),
             Statistic::Max => Some(shown(sums.max.into())),
             Statistic::Std => {
-                let std = self.scale.std(sums.squares, sums.sum, sums.weight);
+                let std = scale.std(sums.squares, sums.sum, sums.weight);
                 Some(std * self.display.factor.abs())
             }
             Statistic::Median | Statistic::Percentile(_) => {

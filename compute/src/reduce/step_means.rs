@@ -58,13 +58,16 @@ pub(crate) fn means_over_region<'a>(
             with_squares: false,
             with_extremes: false,
         };
-        let sums = reduction.accumulated(wanted).await?;
-        let (scale, unit_m2) = (reduction.scale, weighed.unit.size());
-        let steps = reduction.steps.clone().zip(inside).map(|(at, step)| {
+        let periods: Vec<Period> = manifest.steps.iter().map(|step| step.period).collect();
+        let inside: Vec<Period> = inside.iter().map(|step| step.period).collect();
+        // A step by itself is a bin that counts it once.
+        let (sums, scales) = reduction.summed(&periods, &inside, wanted).await?;
+        let unit_m2 = weighed.unit.size();
+        let steps = sums.iter().zip(scales).map(|(of_step, scale)| {
             // What has no data has no sums.
-            let own = sums.steps.get(&at).copied().unwrap_or_default();
+            let own = &of_step.sums;
             StepMean {
-                period: step.period,
+                period: of_step.period,
                 mean: (own.weight > 0).then(|| scale.mean(own.sum, own.weight)),
                 area_m2: own.weight as f64 * unit_m2,
                 sea_m2: own.covered as f64 * unit_m2,

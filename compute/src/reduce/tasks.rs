@@ -104,7 +104,21 @@ impl Version<'_> {
         blocks.chain(sums).collect()
     }
 
-    fn fields(&self, steps: Range<u32>, chunks: &[u32]) -> impl Iterator<Item = Piece> {
+    /// Pieces of single fields that hold all values of some steps where `cells` have weight, and of no others.
+    pub(super) fn fields_alone(
+        &self,
+        steps: impl Iterator<Item = u32>,
+        cells: &Cells<'_>,
+    ) -> Vec<Piece> {
+        let chunks: Vec<u32> = cells.whole.chunks().map(|(chunk, _)| chunk).collect();
+        self.fields(steps, &chunks).collect()
+    }
+
+    fn fields(
+        &self,
+        steps: impl Iterator<Item = u32>,
+        chunks: &[u32],
+    ) -> impl Iterator<Item = Piece> {
         steps.map(move |at| {
             let step = &self.manifest.steps[at as usize];
             Piece {

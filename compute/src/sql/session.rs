@@ -30,7 +30,7 @@ use super::tables::Tables;
 use super::told::{overdue, told};
 use super::worked_out::AnswerFunction;
 use super::yielding::Yielding;
-use super::{analysis, budget, statistics};
+use super::{analysis, budget, joined, statistics};
 use crate::expression::udf::number_functions;
 use crate::{ComputeError, Engine};
 
@@ -192,6 +192,7 @@ impl Sql {
             .map_err(|error| ComputeError::Sql {
                 reason: format!("{}: SQL here reads only", error.strip_backtrace()),
             })?;
+        joined::check(&plan, text.len())?;
         context.execute_logical_plan(plan).await.map_err(failed)
     }
 

@@ -347,3 +347,54 @@ async fn an_extreme_of_a_flux_is_one_on_another_grid_and_averaged() {
         );
     }
 }
+
+/// Nor where arithmetic makes a flux of it; what is only compared with it is one.
+#[tokio::test(flavor = "multi_thread")]
+async fn what_an_expression_makes_of_an_extreme_of_a_flux_has_no_budget() {
+    let (_folder, store) = folder_store();
+    let (id, year) = (product("wavy"), wavy_year(&ONE_DEGREE));
+    land(&store, &id, Quantity::CarbonFlux, ONE_DEGREE, &year).await;
+    let engine = Engine::local(store.clone());
+    for (statistic, name) in [(MapStatistic::Max, "highest"), (MapStatistic::Mean, "mean")] {
+        let options = MapOptions {
+            name: Some(product(name)),
+            ..MapOptions::new(statistic)
+        };
+        let made = derive_statistic(&engine, &id, &options, &|_| ()).await;
+        made.unwrap();
+    }
+    let input = |name: &&str| RequestedInput {
+        name: (*name).to_owned(),
+        product: product(name),
+        matching: Matching::SamePeriod,
+    };
+    let made = async |target: &'static str, expression: &str, inputs: &[&str]| {
+        let request = Request {
+            target: product(target),
+            title: None,
+            quantity: Some(Quantity::CarbonFlux),
+            how: Computation::Expression {
+                expression: expression.to_owned(),
+            },
+            grid: None,
+            inputs: inputs.iter().map(input).collect(),
+            from: None,
+            to: None,
+        };
+        compute(&engine, &request, &|_| ()).await.unwrap();
+        budget(&engine, &total(&product(target), "global")).await
+    };
+    let compared = "CASE WHEN highest > 0 THEN mean ELSE 0 END";
+    let compared = made("compared", compared, &["highest", "mean"]).await;
+    assert_eq!(compared.unwrap().rows.len(), 1);
+    for (target, expression, inputs) in [
+        ("half", "highest * 0.5", &["highest"][..]),
+        ("beside", "mean - highest", &["highest", "mean"][..]),
+        ("again", "half + mean", &["half", "mean"][..]),
+    ] {
+        let refused = made(target, expression, inputs).await.unwrap_err();
+        let refused = refused.to_string();
+        let told = "the result of an expression over the highest values of each cell of wavy";
+        assert!(refused.contains(told), "{target}: {refused}");
+    }
+}

@@ -500,6 +500,44 @@ async fn whatever_would_write_or_read_elsewhere_is_refused_with_the_reason() {
     assert!(!outside.with_extension("csv.parquet").exists(), "{there:?}");
 }
 
+/// A text that is joined with itself so often, a query in another.
+fn doubled(times: usize, joined: &str) -> String {
+    let twice = |at: usize| format!(", t{} AS (SELECT {joined} AS x FROM t{at})", at + 1);
+    let steps: String = (0..times).map(twice).collect();
+    format!("WITH t0 AS (SELECT 'ab' AS x){steps} SELECT length(x) FROM t{times}")
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn texts_are_joined_and_those_that_would_double_without_end_are_refused() {
+    let (_folder, store) = folder_store();
+    sst(&store).await;
+    let sql = sql_of(&Engine::in_process(store, parts(1)));
+    for joined in ["x || x", "concat(x, x)", "concat(upper(x) || x)"] {
+        assert_eq!(one(&sql, &doubled(5, joined)).await, "64", "{joined}");
+        let error = ask(&sql, &doubled(40, joined)).await.unwrap_err();
+        assert!(
+            error.to_string().contains("may have more than 4 MiB"),
+            "{joined}: {error}"
+        );
+    }
+    let of_a_row = "SELECT max(CAST(latitude AS VARCHAR) || ' N, ' || CAST(value AS VARCHAR)) > '' FROM sst_test";
+    assert_eq!(one(&sql, of_a_row).await, "true");
+    let gathered =
+        "SELECT length(string_agg(x || ' ' || x, ',')) FROM (VALUES ('a'), ('b')) AS t(x)";
+    assert_eq!(one(&sql, gathered).await, "7");
+    let branches =
+        ["SELECT x || 'b' || x AS x FROM (VALUES ('c')) AS t(x)"; 30].join(" UNION ALL ");
+    let count = format!("SELECT count(x) FROM ({branches})");
+    assert_eq!(one(&sql, &count).await, "30");
+    for endless in [
+        "WITH RECURSIVE t AS (SELECT 'ab' AS x UNION ALL SELECT x || x FROM t) SELECT max(x) FROM t",
+        "SELECT length((SELECT string_agg(x || x, ',') FROM (SELECT string_agg(x || x, ',') AS x FROM (VALUES ('a')) AS t(x)) AS u))",
+    ] {
+        let error = ask(&sql, endless).await.unwrap_err().to_string();
+        assert!(error.contains("may have more than 4 MiB"), "{error}");
+    }
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn a_question_that_never_ends_is_ended_and_so_is_one_that_nobody_waits_for() {
     let (_folder, store) = folder_store();

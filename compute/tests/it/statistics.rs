@@ -219,6 +219,61 @@ async fn series_of_open_quantities_are_their_means_however_small_or_large_these_
     }
 }
 
+/// Steps of an open quantity, each a hundredth of the one before: in one scale the last ones would be nothing beside the first.
+#[tokio::test(flavor = "multi_thread")]
+async fn steps_far_smaller_than_others_have_their_own_means_and_the_same_bits_in_any_parts() {
+    let (_folder, store) = folder_store();
+    let quantity = Quantity::open("deposition", "kg m-2 s-1", "Deposition").unwrap();
+    let mut steps = wavy_year(&GRID);
+    for (at, (_period, values)) in steps.iter_mut().enumerate() {
+        let factor = 0.01f64.powi(at as i32) / 1e-9;
+        let scaled = |value: &mut f32| *value = (f64::from(*value) * factor) as f32;
+        values.iter_mut().for_each(scaled);
+    }
+    land(&store, &product("wavy"), quantity, GRID, &steps).await;
+    let weights = weights::compute(&GRID, &POLYGON.parse().unwrap(), Earth::Wgs84).unwrap();
+    let query = asked(area(POLYGON), "mean,std,max", TimeStep::Month);
+    let local = Engine::local(store.clone());
+    let answer = statistics(&local, &query).await.unwrap();
+    let region = POLYGON.parse().unwrap();
+    let series = contract::series::RegionSeriesQuery::new(product("wavy"), region);
+    let series = compute::stats::region_series(&local, &series).await;
+    let series = series.unwrap().series;
+    assert_eq!((answer.rows.len(), series.len()), (12, 12));
+    for ((row, own), step) in answer.rows.iter().zip(&series).zip(&steps) {
+        let held = weighed(std::slice::from_ref(step), &weights, &GRID);
+        let weight: f64 = held.iter().map(|(_, weight)| weight).sum();
+        let mean_of = |of: &dyn Fn(f64) -> f64| {
+            let each = held.iter();
+            let each = each.map(|(value, weight)| of(f64::from(*value)) * weight);
+            each.sum::<f64>() / weight
+        };
+        let mean = mean_of(&|value| value);
+        let std = mean_of(&|value| (value - mean).powi(2)).sqrt();
+        for (name, right) in [("mean", mean), ("std", std)] {
+            let found = row.values[name].unwrap();
+            assert!((found / right - 1.0).abs() < 1e-6, "{name} {row:?} {right}");
+        }
+        assert_eq!(
+            row.values["mean"].map(f64::to_bits),
+            own.mean.map(f64::to_bits)
+        );
+    }
+    // A mean of all steps is that of the large ones.
+    let all = StatisticsQuery {
+        step: TimeStep::Total,
+        ..query.clone()
+    };
+    let of_all = statistics(&local, &all).await.unwrap();
+    let right = plain(&weighed(&steps, &weights, &GRID), 50.0)[0];
+    assert!((of_all.rows[0].values["mean"].unwrap() / right - 1.0).abs() < 1e-6);
+    let ballista = [1, 2, 7].map(|count| Engine::standalone(store.clone(), parts(count)));
+    let in_process = [2, 7].map(|count| Engine::in_process(store.clone(), parts(count)));
+    for engine in in_process.into_iter().chain(ballista) {
+        assert!(statistics(&engine, &query).await.unwrap() == answer);
+    }
+}
+
 /// Answers to some questions.
 async fn answers(engine: &Engine) -> Vec<StatisticsAnswer> {
     let place = LonLatDeg::new(171.3, -40.2).unwrap();

@@ -297,8 +297,14 @@ async fn read_mapping(
         (&names[1], Role::Longitude, &lon_deg),
     ] {
         if let Some((off_deg, cells)) = mapping.moved(role, labels, registration) {
+            let short = mapping
+                .short_of_poles_deg()
+                .filter(|_| role == Role::Latitude);
+            let short = short.map_or_else(String::new, |deg| {
+                format!("; they end {deg:.5} degrees before the poles, round which nothing counts")
+            });
             planning.assume(format!(
-                "{name}: is not evenly spaced; its cells are taken for evenly spaced ones, the farthest {off_deg:.5} degrees ({:.1} % of a cell) from its label",
+                "{name}: is not evenly spaced; its cells are taken for evenly spaced ones, the farthest {off_deg:.5} degrees ({:.1} % of a cell) from its label{short}",
                 100.0 * cells
             ));
         }

@@ -343,6 +343,10 @@ async fn latitudes_that_are_not_quite_even_are_told_of() {
         told.len() == 1 && told[0].contains("0.10") && told[0].contains("(0.5 % of a cell)"),
         "{outcome}"
     );
+    assert!(
+        told[0].contains("degrees before the poles, round which nothing counts"),
+        "{told:?}"
+    );
     let mut uneven = gaussian;
     uneven[3] += 1.0;
     assert_refused(&file(&uneven), &["lat: ", "not evenly spaced", "regrid"]).await;

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 
 use contract::analysis::MapStatistic;
 use contract::computed::Computation;
-use contract::manifest::Manifest;
+use contract::manifest::{Manifest, ManifestId};
 use contract::product::ProductId;
 
 use super::{latest, load};
@@ -63,17 +63,7 @@ pub async fn over_time(
                 statistic: MapStatistic::Mean | MapStatistic::Climatology,
                 ..
             } => {
-                let found = match load(store, from).await {
-                    Ok(found) => Some(found),
-                    // That version is let go, or another one has its number; of what kind the product is the newest one says.
-                    Err(error)
-                        if error.is_not_found()
-                            || matches!(error, StorageError::Damaged { .. }) =>
-                    {
-                        latest(store, &from.product).await?
-                    }
-                    Err(error) => return Err(error),
-                };
+                let found = of_kind(store, from).await?;
                 match found {
                     Some(found) if seen.insert(found.product.clone()) => source = Some(found),
                     _ => return Ok(known),
@@ -81,5 +71,21 @@ pub async fn over_time(
             }
             _ => return Ok(known),
         }
+    }
+}
+
+/// A version that others are made of, or where it is gone the newest one, which says of what kind its product is; none of a product that is
+/// gone.
+///
+/// # Errors
+/// Neither can be read.
+pub async fn of_kind(store: &Store, id: &ManifestId) -> Result<Option<Manifest>, StorageError> {
+    match load(store, id).await {
+        Ok(found) => Ok(Some(found)),
+        // That version is let go, or another one has its number.
+        Err(error) if error.is_not_found() || matches!(error, StorageError::Damaged { .. }) => {
+            latest(store, &id.product).await
+        }
+        Err(error) => Err(error),
     }
 }

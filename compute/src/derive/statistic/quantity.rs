@@ -160,6 +160,12 @@ mod tests {
             "mm day-1"
         );
         assert_eq!(of(Quantity::WindSpeed, MapStatistic::TrendPValue).1, "1");
+        // The title, which is the `long_name` of cubes and exports, says of what it is one.
+        let spread = super::of(sst, None, MapStatistic::Spread).unwrap().0;
+        assert_eq!(
+            spread.title(),
+            "Sea-surface temperature, standard deviation"
+        );
     }
 
     #[test]

@@ -132,6 +132,15 @@ impl Mapping {
         (off_deg > SNAP_CELLS * cell + rounding_deg).then_some((off_deg, off_deg / cell))
     }
 
+    /// How far from the poles the cells of a grid end that another row would not fit beside, degrees: those of a Gaussian grid end 0.27 of a
+    /// cell before them, where the cells of its file reach the poles. None of a part of the globe.
+    pub(crate) fn short_of_poles_deg(&self) -> Option<f64> {
+        let grid = self.grid;
+        let left = [90.0 - grid.north_deg, grid.south_deg() + 90.0].map(|deg| deg / grid.dlat_deg);
+        let is_short = left.iter().all(|cells| (SNAP_CELLS..0.5).contains(cells));
+        is_short.then(|| left[0].max(left[1]) * grid.dlat_deg)
+    }
+
     /// A grid that a profile states, for files that have no axes.
     pub(crate) fn from_grid(grid: Grid, north_first: bool) -> Result<Self, Rejection> {
         let file_rows = if north_first {
@@ -408,6 +417,10 @@ mod tests {
         assert!((0.10..0.11).contains(&off_deg), "{off_deg}");
         assert!((cells - 0.005).abs() < 1e-4, "{cells}");
         assert_eq!(moved(&m, Role::Longitude, &lon), None);
+        // It ends at 84.34 degrees by its labels and step, never beyond a pole.
+        let short_deg = m.short_of_poles_deg().unwrap();
+        assert!((short_deg - 5.66).abs() < 0.02, "{short_deg}");
+        assert!(m.grid.north_deg < 90.0 && m.grid.south_deg() > -90.0);
         // Longitudes that drift are moved by their drift.
         let lon = labels(0.0, 359.92 / 4319.0, 4320);
         let lat = labels(89.5, -1.0, 180);
@@ -415,6 +428,7 @@ mod tests {
         let (_, cells) = moved(&m, Role::Longitude, &lon).unwrap();
         assert!((0.02..0.05).contains(&cells), "{cells}");
         assert_eq!(moved(&m, Role::Latitude, &lat), None);
+        assert_eq!(m.short_of_poles_deg(), None);
     }
 
     #[test]
