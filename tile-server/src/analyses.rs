@@ -16,6 +16,7 @@ use contract::region::{AskedRegion, MaskCode, Polygon, Region};
 use contract::rows::{RowsForm, Tabular};
 use contract::series::RegionSeriesQuery;
 use contract::statistics::StatisticsQuery;
+use prometheus::IntCounter;
 use quick_cache::Weighter;
 use quick_cache::sync::Cache;
 
@@ -117,11 +118,12 @@ impl<T> Weighter<Digest, Arc<T>> for Weight<T> {
 }
 
 impl<T: Send + Sync + 'static> Answers<T> {
-    /// Remembers as many as together have at most this weight; `typical_count` sizes tables.
-    fn new(typical_count: usize, most: u64, weight: fn(&T) -> u64) -> Self {
+    /// Remembers as many as together have at most this weight; `typical_count` sizes tables, `panics` counts those of
+    /// computing one.
+    fn new(typical_count: usize, most: u64, weight: fn(&T) -> u64, panics: &IntCounter) -> Self {
         Self {
             remembered: Cache::with_weighter(typical_count, most, Weight(weight)),
-            under_way: SingleFlight::default(),
+            under_way: SingleFlight::new(panics),
         }
     }
 
@@ -154,17 +156,18 @@ impl<T: Send + Sync + 'static> Answers<T> {
 impl Analyses {
     /// Nothing computed yet.
     pub(crate) fn new(analyst: Arc<dyn Analyse>, gate: FairGate, metrics: Metrics) -> Self {
+        let panics = &metrics.panics;
+        let made_of_series = MADE_OF_SERIES as u64;
+        let mask_bytes = |one: &AskedRegion| region_bytes(one) + 1;
         Self {
             analyst,
             gate,
+            budgets: Answers::new(BUDGETS, BUDGET_ROWS, budget_rows, panics),
+            histories: Answers::new(HISTORIES, HISTORIES as u64, |_one| 1, panics),
+            texts: Answers::new(TEXTS, TEXT_BYTES, text_bytes, panics),
+            made_of_series: Answers::new(MADE_OF_SERIES, made_of_series, |_one| 1, panics),
+            mask_regions: Answers::new(MASK_REGIONS, MASK_REGION_BYTES, mask_bytes, panics),
             metrics,
-            budgets: Answers::new(BUDGETS, BUDGET_ROWS, budget_rows),
-            histories: Answers::new(HISTORIES, HISTORIES as u64, |_one| 1),
-            texts: Answers::new(TEXTS, TEXT_BYTES, text_bytes),
-            made_of_series: Answers::new(MADE_OF_SERIES, MADE_OF_SERIES as u64, |_one| 1),
-            mask_regions: Answers::new(MASK_REGIONS, MASK_REGION_BYTES, |one| {
-                region_bytes(one) + 1
-            }),
         }
     }
 
@@ -327,7 +330,7 @@ mod tests {
         let registry = crate::metrics::Registry::new();
         let metrics = Metrics::register(&registry).unwrap();
         let gate = FairGate::new(1, 1, metrics.analyses_waiting.clone());
-        let answers: Answers<Bytes> = Answers::new(4, 1000, text_bytes);
+        let answers: Answers<Bytes> = Answers::new(4, 1000, text_bytes, &metrics.panics);
         for number in 0..50_u8 {
             let computed = async move { Ok::<_, ServerError>(Bytes::from(vec![number; 300])) };
             let key = Digest::of(&[number]);

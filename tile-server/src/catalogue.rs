@@ -17,6 +17,7 @@ use futures::future::{BoxFuture, Shared};
 use storage::manifests::{self, AtInstant};
 use storage::{StorageError, Store};
 
+use crate::caught::caught;
 use crate::error::ServerError;
 use crate::metrics::Metrics;
 use crate::versions::Versions;
@@ -63,7 +64,7 @@ struct StoreRead {
 impl Catalogue {
     /// An empty catalogue that reads the store when it is first asked.
     pub fn new(store: Store, max_age: Duration, metrics: Metrics) -> Self {
-        let versions = Versions::new(store.clone());
+        let versions = Versions::new(store.clone(), &metrics.panics);
         Self {
             reader: Arc::new(Reader {
                 store,
@@ -281,10 +282,22 @@ impl Catalogue {
 
     /// Begins to read the store; what comes of it is kept however long it takes.
     fn read(&self, state: &mut State) -> StoreRead {
+        let (reader, before) = (Arc::clone(&self.reader), Arc::clone(&state.snapshot));
+        let reading = async move { reader.read(&before).await.map_err(ServerError::from) };
+        self.keep(state, reading)
+    }
+
+    /// Begins to read the store in this way, once for all who ask meanwhile.
+    fn keep(
+        &self,
+        state: &mut State,
+        reading: impl Future<Output = Result<Snapshot, ServerError>> + Send + 'static,
+    ) -> StoreRead {
         let (before, epoch) = (Arc::clone(&state.snapshot), state.epoch);
         let (reader, held) = (Arc::clone(&self.reader), Arc::clone(&self.state));
         let task = tokio::spawn(async move {
-            let read = reader.read(&before).await;
+            // Let through, a panic would be what all who ask are told from now on.
+            let read = caught(&reader.metrics.panics, reading).await;
             let mut state = locked(&held);
             let is_of_now = state.epoch == epoch;
             if is_of_now {
@@ -300,7 +313,9 @@ impl Catalogue {
                     Ok(snapshot)
                 }
                 Err(error) => {
-                    reader.metrics.store_failures.inc();
+                    if !matches!(error, ServerError::Defect { .. }) {
+                        reader.metrics.store_failures.inc();
+                    }
                     tracing::warn!(%error, "the list of products cannot be read; the one before is used");
                     if is_of_now && !before.is_first() {
                         // As if it had been read now: the store is asked again when that is too old.
@@ -308,7 +323,7 @@ impl Catalogue {
                         let before = Snapshot::clone(&before);
                         state.snapshot = Arc::new(Snapshot { read_at, ..before });
                     }
-                    Err(ServerError::from(error))
+                    Err(error)
                 }
             }
         });
@@ -343,4 +358,29 @@ fn drifting(layer: Arc<Layer>, northward: Option<&Northward>) -> Arc<Layer> {
 fn locked(state: &Mutex<State>) -> MutexGuard<'_, State> {
     // Changed by single assignments, so a poisoned lock still guards a whole state.
     state.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::metrics::Registry;
+
+    async fn panicking() -> Result<Snapshot, ServerError> {
+        tokio::task::yield_now().await;
+        panic!("a planted panic")
+    }
+
+    #[tokio::test]
+    async fn a_look_that_panics_is_told_to_all_who_wait_and_the_next_one_is_begun_anew() {
+        let metrics = Metrics::register(&Registry::new()).unwrap();
+        let catalogue = Catalogue::new(Store::memory(), Duration::ZERO, metrics.clone());
+        drop(catalogue.keep(&mut catalogue.state(), panicking()));
+        let (first, second) = futures::future::join(catalogue.layers(), catalogue.layers()).await;
+        for answer in [first, second] {
+            let error = answer.unwrap_err();
+            assert!(error.to_string().contains("a planted panic"), "{error}");
+        }
+        assert_eq!((metrics.panics.get(), metrics.store_failures.get()), (1, 0));
+        assert!(catalogue.layers().await.unwrap().is_empty());
+    }
 }

@@ -7,6 +7,7 @@ use contract::digest::Digest;
 use contract::manifest::{Manifest, ManifestId};
 use contract::product::ProductId;
 use futures::stream::{self, StreamExt as _, TryStreamExt as _};
+use prometheus::IntCounter;
 use quick_cache::sync::Cache;
 use storage::{StorageError, Store, manifests};
 
@@ -37,13 +38,13 @@ impl Debug for Derivations {
 }
 
 impl Derivations {
-    /// None known yet.
-    pub(crate) fn new(store: Store) -> Self {
+    /// None known yet; `panics` counts those of looking for one.
+    pub(crate) fn new(store: Store, panics: &IntCounter) -> Self {
         Self {
             store,
             sources: Arc::new(Cache::new(REMEMBERED)),
             none_by: Cache::new(REMEMBERED_NONE),
-            looking: SingleFlight::default(),
+            looking: SingleFlight::new(panics),
         }
     }
 

@@ -1,5 +1,6 @@
 //! The failures of this server, and the one place where a failure becomes a status and a text for users.
 
+use std::any::Any;
 use std::net::SocketAddr;
 use std::sync::Arc;
 
@@ -176,6 +177,17 @@ impl ServerError {
     /// A part of the address that is no value of its type.
     pub fn invalid(what: &'static str, text: &str, reason: impl Into<String>) -> Self {
         Self::Contract(ContractError::invalid(what, text, reason))
+    }
+
+    /// A panic of `what`, with what it said.
+    pub(crate) fn panicked(what: &str, payload: &(dyn Any + Send)) -> Self {
+        let text = payload.downcast_ref::<String>().map(String::as_str);
+        let text = text
+            .or_else(|| payload.downcast_ref::<&str>().copied())
+            .unwrap_or("without a text");
+        Self::Defect {
+            what: format!("{what} panicked: {text}"),
+        }
     }
 
     /// What it means for who asked.

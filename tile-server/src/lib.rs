@@ -32,6 +32,7 @@ mod annotations;
 pub mod backend;
 mod bodies;
 mod catalogue;
+mod caught;
 mod client;
 pub mod config;
 mod connections;

@@ -10,6 +10,7 @@
 mod freshness;
 mod hot;
 mod news;
+mod seen;
 mod service;
 mod touched;
 mod watch;

@@ -123,7 +123,7 @@ impl Pictures {
         metrics: Metrics,
     ) -> Self {
         Self {
-            flights: SingleFlight::default(),
+            flights: SingleFlight::new(&metrics.panics),
             maker: Arc::new(Maker {
                 store,
                 allowance: Allowance::new(limits.stored_bytes_per_day, Instant::now()),

@@ -9,24 +9,21 @@ use std::sync::{Mutex, PoisonError};
 use contract::digest::Digest;
 use futures::FutureExt as _;
 use futures::future::{BoxFuture, Shared, WeakShared};
+use prometheus::IntCounter;
 
+use crate::caught::caught;
 use crate::error::ServerError;
 
 type Flight<V> = BoxFuture<'static, Result<V, ServerError>>;
 
 /// Answers under way, by the digest of what was asked.
 ///
-/// Only those who wait keep an answer under way alive: when the last one goes away, it is dropped.
+/// Only those who wait keep an answer under way alive: when the last one goes away, it is dropped. A panic of it is an
+/// answer too: that there is a defect.
 pub(crate) struct SingleFlight<V: Clone + Send + Sync + 'static> {
     under_way: Mutex<HashMap<Digest, WeakShared<Flight<V>>>>,
-}
-
-impl<V: Clone + Send + Sync + 'static> Default for SingleFlight<V> {
-    fn default() -> Self {
-        Self {
-            under_way: Mutex::default(),
-        }
-    }
+    /// Where panics are counted.
+    panics: IntCounter,
 }
 
 /// One who waits; leaving takes an answer nobody waits for off the list.
@@ -37,6 +34,14 @@ struct Waiting<'a, V: Clone + Send + Sync + 'static> {
 }
 
 impl<V: Clone + Send + Sync + 'static> SingleFlight<V> {
+    /// Nothing under way yet; `panics` counts those of answers.
+    pub(crate) fn new(panics: &IntCounter) -> Self {
+        Self {
+            under_way: Mutex::default(),
+            panics: panics.clone(),
+        }
+    }
+
     /// Waits for the answer under way for `key`, or starts it. `start` is called only if there is none.
     pub(crate) async fn join<F>(
         &self,
@@ -54,7 +59,8 @@ impl<V: Clone + Send + Sync + 'static> SingleFlight<V> {
             if let Some(flight) = under_way.get(&key).and_then(WeakShared::upgrade) {
                 flight
             } else {
-                let flight = start().boxed().shared();
+                let (panics, work) = (self.panics.clone(), start());
+                let flight = async move { caught(&panics, work).await }.boxed().shared();
                 if let Some(weak) = flight.downgrade() {
                     under_way.insert(key, weak);
                 }
@@ -99,15 +105,25 @@ mod tests {
     use super::*;
     use std::sync::Arc;
     use std::sync::atomic::{AtomicU32, Ordering};
+    use std::time::Duration;
     use tokio::sync::Notify;
 
     fn key() -> Digest {
         Digest::of(b"k")
     }
 
+    fn flights() -> SingleFlight<u32> {
+        SingleFlight::new(&IntCounter::new("panics", "For a test.").unwrap())
+    }
+
+    async fn panicking() -> Result<u32, ServerError> {
+        tokio::task::yield_now().await;
+        panic!("a planted panic")
+    }
+
     #[tokio::test]
     async fn many_who_ask_at_once_get_one_answer() {
-        let flights = SingleFlight::<u32>::default();
+        let flights = flights();
         let (starts, go) = (AtomicU32::new(0), Arc::new(Notify::new()));
         let ask = || {
             flights.join(key(), || {
@@ -138,12 +154,29 @@ mod tests {
 
     #[tokio::test]
     async fn what_nobody_waits_for_is_dropped_and_started_anew() {
-        let flights = SingleFlight::<u32>::default();
+        let flights = flights();
         let mut lost = Box::pin(flights.join(key(), std::future::pending));
         assert!(lost.as_mut().now_or_never().is_none());
         drop(lost);
         assert_eq!(flights.len(), 0);
         assert_eq!(flights.join(key(), || async { Ok(1) }).await.unwrap(), 1);
         assert_eq!(flights.join(key(), || async { Ok(2) }).await.unwrap(), 2);
+    }
+
+    #[tokio::test]
+    async fn a_panic_is_told_to_all_who_wait_and_what_is_asked_next_is_started_anew() {
+        let flights = flights();
+        let both = futures::future::join(
+            flights.join(key(), panicking),
+            flights.join(key(), panicking),
+        );
+        let told = tokio::time::timeout(Duration::from_secs(20), both).await;
+        let (first, second) = told.expect("both are told");
+        for answer in [first, second] {
+            let error = answer.unwrap_err();
+            assert!(error.to_string().contains("a planted panic"), "{error}");
+        }
+        assert_eq!((flights.panics.get(), flights.len()), (1, 0));
+        assert_eq!(flights.join(key(), || async { Ok(1) }).await.unwrap(), 1);
     }
 }

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use contract::manifest::{Manifest, ManifestId};
 use contract::quantity::Quantity;
+use prometheus::IntCounter;
 use quick_cache::sync::Cache;
 use storage::{StorageError, Store, manifests};
 
@@ -24,12 +25,12 @@ pub(crate) struct Versions {
 }
 
 impl Versions {
-    /// None read yet.
-    pub(crate) fn new(store: Store) -> Self {
+    /// None read yet; `panics` counts those of looking for derived ones.
+    pub(crate) fn new(store: Store, panics: &IntCounter) -> Self {
         Self {
             known: Cache::new(REMEMBERED),
             manifests: Cache::new(REMEMBERED),
-            derivations: Derivations::new(store.clone()),
+            derivations: Derivations::new(store.clone(), panics),
             store,
         }
     }

@@ -58,6 +58,16 @@ async fn a_reader_that_hangs_is_killed() {
     assert!(start.elapsed() < Duration::from_secs(10));
 }
 
+/// Its end would not be told by its output, and a place for readers would be taken until the file's time is over.
+#[tokio::test]
+async fn a_reader_that_closes_its_output_and_goes_on_is_killed() {
+    let start = std::time::Instant::now();
+    let (reason, line) = refused_by("exec >&-; exec sleep 300").await;
+    assert_eq!(reason, RejectReason::Corrupt);
+    assert!(line.contains("close its output and go on"), "{line}");
+    assert!(start.elapsed() < Duration::from_mins(1));
+}
+
 #[tokio::test]
 async fn a_reader_out_of_processor_time_says_too_large() {
     let (reason, line) = refused_by("ulimit -S -t 1; while :; do :; done").await;

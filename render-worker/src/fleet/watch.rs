@@ -1,6 +1,6 @@
 //! The watch over a fleet: names are looked up again, workers asked how they are, once a second.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Weak};
 use std::time::Duration;
 
@@ -19,13 +19,17 @@ const LOOK_UP_LIMIT: Duration = Duration::from_secs(2);
 /// Workers that one name may bring.
 const MOST_OF_A_NAME: usize = 256;
 
+/// Workers of each name, as it was answered for last.
+type Answers = BTreeMap<HostPort, BTreeSet<String>>;
+
 /// Watches until the fleet is dropped.
 pub(super) async fn run(fleet: Weak<Inner>) {
     let mut looked_up: Option<Instant> = None;
+    let mut answers = Answers::new();
     loop {
         let Some(inner) = fleet.upgrade() else { return };
         if looked_up.is_none_or(|last| last.elapsed() >= LOOK_UP) {
-            inner.look_up_names().await;
+            inner.look_up_names(&mut answers).await;
             looked_up = Some(Instant::now());
         }
         let members: Vec<Arc<Member>> = inner.members().values().cloned().collect();
@@ -37,22 +41,21 @@ pub(super) async fn run(fleet: Weak<Inner>) {
 }
 
 impl Inner {
-    /// Brings the members of names up to date. A name that cannot be looked up keeps those it had.
-    async fn look_up_names(&self) {
+    /// Brings the members of names up to date. A name that cannot be looked up keeps those it had, and holds up no other.
+    async fn look_up_names(&self, answers: &mut Answers) {
         let mut wanted = BTreeSet::new();
+        let mut names = vec![];
         for address in &self.settings.render_workers {
             match address {
                 WorkerAddress::Fixed(at) => {
                     wanted.insert(at.to_string());
                 }
-                WorkerAddress::Looked(at) => match look_up(at).await {
-                    Ok(found) => wanted.extend(found),
-                    Err(error) => {
-                        tracing::warn!(name = %at, error, "render workers cannot be looked up");
-                        return;
-                    }
-                },
+                WorkerAddress::Looked(at) => names.push(at),
             }
+        }
+        let found = join_all(names.iter().map(|at| look_up(at))).await;
+        for (at, found) in names.into_iter().zip(found) {
+            wanted.extend(workers_of(answers, at, found));
         }
         for name in &wanted {
             if let Err(error) = self.admit(name) {
@@ -79,6 +82,23 @@ impl Inner {
     }
 }
 
+/// Those that were found at a name; where it could not be looked up, those that it had.
+fn workers_of(
+    answers: &mut Answers,
+    at: &HostPort,
+    found: Result<BTreeSet<String>, String>,
+) -> BTreeSet<String> {
+    match found {
+        Ok(found) => {
+            answers.insert(at.clone(), found);
+        }
+        Err(error) => {
+            tracing::warn!(name = %at, error, "render workers cannot be looked up");
+        }
+    }
+    answers.get(at).cloned().unwrap_or_default()
+}
+
 async fn look_up(at: &HostPort) -> Result<BTreeSet<String>, String> {
     let asked = tokio::net::lookup_host((at.host.as_str(), at.port));
     let found = tokio::time::timeout(LOOK_UP_LIMIT, asked)
@@ -90,4 +110,24 @@ async fn look_up(at: &HostPort) -> Result<BTreeSet<String>, String> {
         .take(MOST_OF_A_NAME)
         .map(|address| address.to_string());
     Ok(names.collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_that_cannot_be_looked_up_keeps_the_workers_it_had() {
+        let mut answers = Answers::new();
+        let (gpu, cpu): (HostPort, HostPort) =
+            ("gpu:50061".parse().unwrap(), "cpu:50061".parse().unwrap());
+        let two = BTreeSet::from(["10.0.0.1:50061".to_owned(), "10.0.0.2:50061".to_owned()]);
+        let away = || Err("no answer".to_owned());
+        assert!(workers_of(&mut answers, &gpu, away()).is_empty());
+        assert_eq!(workers_of(&mut answers, &gpu, Ok(two.clone())), two);
+        assert_eq!(workers_of(&mut answers, &gpu, away()), two);
+        assert!(workers_of(&mut answers, &cpu, away()).is_empty());
+        assert!(workers_of(&mut answers, &gpu, Ok(BTreeSet::new())).is_empty());
+        assert!(workers_of(&mut answers, &gpu, away()).is_empty());
+    }
 }

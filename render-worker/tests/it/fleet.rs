@@ -259,6 +259,28 @@ async fn a_name_brings_the_workers_at_its_addresses() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn a_name_that_cannot_be_looked_up_holds_up_no_other() {
+    let store = Store::memory();
+    let job = two_months_in(&store).await;
+    let worker = Worker::start(&store, 1, 8);
+    let (_, port) = worker.name.rsplit_once(':').unwrap();
+    let named = format!("dns:localhost:{port}");
+    let (named, nowhere) = (named.as_str(), "dns:nowhere.invalid:1");
+    for names in [[nowhere, named], [named, nowhere]] {
+        let fleet = fleet(&names).await;
+        until("one address answers", || {
+            fleet.health().values().any(|health| *health == Health::Up)
+        })
+        .await;
+        let picture = fleet
+            .draw(&job, Order::on_demand(USUAL), "t")
+            .await
+            .unwrap();
+        assert_eq!(picture.worker, worker.name, "{names:?}");
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn no_answer_within_the_time_is_an_error_within_the_time() {
     let (folder, _store, job) = shared_store().await;
     let process = WorkerProcess::start(folder.path());

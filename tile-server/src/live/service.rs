@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use contract::event::{Body, Event};
-use contract::manifest::{Manifest, ManifestId};
+use contract::manifest::ManifestId;
 use contract::product::ProductId;
 use contract::quantity::Quantity;
 use contract::time::Period;
@@ -17,6 +17,7 @@ use storage::log::{EventLog, Follower, Message, Start};
 use tokio::sync::mpsc;
 
 use crate::catalogue::Layer;
+use crate::live::seen::{Seen, Version};
 use crate::live::touched;
 use crate::request;
 use crate::state::AppState;
@@ -31,11 +32,12 @@ const WAIT: Duration = Duration::from_millis(250);
 pub struct LiveService {
     state: AppState,
     log: Arc<dyn EventLog>,
-    /// Versions seen, to tell what a newer one touches.
+    /// Products as viewers were told of them.
     seen: BTreeMap<ProductId, Seen>,
+    /// Versions after which tiles were ordered, or which were there before anything was heard. A version that viewers are
+    /// told of when the log is back may have its event still to come.
+    ordered: BTreeMap<ProductId, Version>,
 }
-
-type Seen = (ManifestId, Arc<Manifest>);
 
 impl LiveService {
     pub(crate) fn new(state: AppState, log: Arc<dyn EventLog>) -> Self {
@@ -43,11 +45,12 @@ impl LiveService {
             state,
             log,
             seen: BTreeMap::new(),
+            ordered: BTreeMap::new(),
         }
     }
 
     /// Follows until asked to stop. A log that goes away is waited for; of what was appended meanwhile viewers are told,
-    /// but no tiles are ordered.
+    /// but no tiles are ordered before the product's next event is heard.
     ///
     /// # Errors
     /// The log is not set up as it must be.
@@ -109,7 +112,9 @@ impl LiveService {
     async fn hear(&mut self, event: &Event) -> Result<(), StorageError> {
         match &event.body {
             Body::GranuleLanded { manifest, .. } => {
-                let touched = self.new_version(event, manifest).await?;
+                let Some(touched) = self.new_version(event, manifest).await? else {
+                    return Ok(());
+                };
                 self.drift(event, manifest, &touched).await
             }
             Body::ProductDerived {
@@ -118,7 +123,9 @@ impl LiveService {
             } => {
                 // The particles of the source are lifted by what was derived: its pictures are new too, at least where
                 // what was derived is, which reaches from the first changed step of the source to the end.
-                let touched = self.new_version(event, manifest).await?;
+                let Some(touched) = self.new_version(event, manifest).await? else {
+                    return Ok(());
+                };
                 self.redraw(event, derived_from, &touched).await
             }
             Body::RenderDone {
@@ -136,7 +143,9 @@ impl LiveService {
         match self.state.catalogue.layers().await {
             Ok(layers) => {
                 for layer in layers {
-                    self.see(&layer);
+                    let product = &layer.manifest.product;
+                    self.seen.insert(product.clone(), Seen::of(&layer));
+                    self.ordered.insert(product.clone(), version(&layer));
                 }
             }
             Err(error) => {
@@ -145,16 +154,14 @@ impl LiveService {
         }
     }
 
-    /// Tells of what landed while nobody followed.
+    /// Tells of what landed while nobody followed: of what lifts or drifts the particles of a product too.
     async fn catch_up(&mut self) {
         self.renew().await;
         let Ok(layers) = self.state.catalogue.layers().await else {
             return;
         };
         for layer in layers {
-            if let Some(touched) = self.see(&layer) {
-                self.state.news.tell(layer.id.clone(), touched);
-            }
+            self.tell(&layer);
         }
     }
 
@@ -168,37 +175,44 @@ impl LiveService {
         }
     }
 
-    /// The times that a version touches; none if it was seen before.
-    fn see(&mut self, layer: &Layer) -> Option<Vec<Period>> {
-        let now = (layer.id.clone(), Arc::clone(&layer.manifest));
-        let before = self.seen.insert(layer.manifest.product.clone(), now);
+    /// Tells viewers what is new of a product since they were told of it.
+    fn tell(&mut self, layer: &Layer) {
+        let product = &layer.manifest.product;
+        let now = Seen::of(layer);
+        now.tell(self.seen.get(product), &self.state.news);
+        self.seen.insert(product.clone(), now);
+    }
+
+    /// The times that a version touches since tiles were ordered; none if that was after this version.
+    fn to_order(&mut self, layer: &Layer) -> Option<Vec<Period>> {
+        let product = layer.manifest.product.clone();
+        let before = self.ordered.insert(product, version(layer));
         if before.as_ref().is_some_and(|(id, _)| *id == layer.id) {
             return None;
         }
-        Some(touched(
-            before.as_ref().map(|(_, old)| &**old),
-            &layer.manifest,
-        ))
+        let before = before.as_ref().map(|(_, old)| &**old);
+        Some(touched(before, &layer.manifest))
     }
 
+    /// Shows a version: the times that it touches, none if its event was heard before or it cannot be shown.
     async fn new_version(
         &mut self,
         event: &Event,
         manifest: &ManifestId,
-    ) -> Result<Vec<Period>, StorageError> {
+    ) -> Result<Option<Vec<Period>>, StorageError> {
         self.renew().await;
         let layer = match self.state.catalogue.layer(manifest.product.as_str()).await {
             Ok(layer) => layer,
             Err(error) => {
                 tracing::warn!(trace = event.trace, %manifest, %error, "a version cannot be shown");
-                return Ok(vec![]);
+                return Ok(None);
             }
         };
-        let Some(touched) = self.see(&layer) else {
-            return Ok(vec![]);
+        self.tell(&layer);
+        let Some(touched) = self.to_order(&layer) else {
+            return Ok(None);
         };
         tracing::info!(trace = event.trace, %manifest, periods = touched.len(), "a new version is shown");
-        self.state.news.tell(layer.id.clone(), touched.clone());
         // Pictures of a flux wait for what lifts their particles.
         let waits = layer.manifest.quantity == Quantity::CarbonFlux;
         if !waits {
@@ -207,12 +221,12 @@ impl LiveService {
             }
             self.order(event, &layer, &touched).await?;
         }
-        Ok(touched)
+        Ok(Some(touched))
     }
 
     /// Draws anew what the derivation from `source` touches.
     async fn redraw(
-        &self,
+        &mut self,
         event: &Event,
         source: &ManifestId,
         touched: &[Period],
@@ -223,13 +237,13 @@ impl LiveService {
         if let Some(noticed) = event.noticed {
             self.state.freshness.expect_version(&layer.id, noticed);
         }
-        self.state.news.tell(layer.id.clone(), touched.to_vec());
+        self.tell(&layer);
         self.order(event, &layer, touched).await
     }
 
     /// Draws anew what drifts with this northward part of a vector, if it is one.
     async fn drift(
-        &self,
+        &mut self,
         event: &Event,
         northward: &ManifestId,
         touched: &[Period],
@@ -240,10 +254,10 @@ impl LiveService {
         let Ok(layer) = self.state.catalogue.layer(eastward.as_str()).await else {
             return Ok(());
         };
-        if layer.northward.is_none() || touched.is_empty() {
+        if layer.northward.is_none() {
             return Ok(());
         }
-        self.state.news.tell(layer.id.clone(), touched.to_vec());
+        self.tell(&layer);
         self.order(event, &layer, touched).await
     }
 
@@ -282,6 +296,10 @@ impl LiveService {
             .collect();
         self.log.append(&events).await
     }
+}
+
+fn version(layer: &Layer) -> Version {
+    (layer.id.clone(), Arc::clone(&layer.manifest))
 }
 
 /// Hands on what a follower brings, for as long as somebody takes it.

@@ -2,14 +2,11 @@
 //! to viewers here as well.
 
 use std::collections::BTreeMap;
-use std::sync::Arc;
 use std::time::Duration;
 
-use contract::manifest::{Manifest, ManifestId};
 use contract::product::ProductId;
 
-use crate::catalogue::Layer;
-use crate::live::touched;
+use crate::live::seen::Seen;
 use crate::state::AppState;
 
 /// Shortest pause between two looks: a look lists the manifests of all products.
@@ -22,15 +19,6 @@ pub struct Watch {
     /// What was there at the look before; none before the first one.
     seen: Option<BTreeMap<ProductId, Seen>>,
 }
-
-struct Seen {
-    version: Version,
-    lift: Option<Version>,
-    /// What its particles drift with besides it.
-    northward: Option<Version>,
-}
-
-type Version = (ManifestId, Arc<Manifest>);
 
 impl Watch {
     pub(crate) fn new(state: AppState) -> Self {
@@ -63,55 +51,14 @@ impl Watch {
         };
         let found = layers.iter().map(|layer| {
             let product = layer.manifest.product.clone();
-            (product, seen(layer))
+            (product, Seen::of(layer))
         });
         let found: BTreeMap<_, _> = found.collect();
         if let Some(before) = &self.seen {
             for (product, now) in &found {
-                self.compare(before.get(product), now);
+                now.tell(before.get(product), &self.state.news);
             }
         }
         self.seen = Some(found);
-    }
-
-    /// Tells what differs: the values, what lifts their particles, and what those drift with.
-    fn compare(&self, before: Option<&Seen>, now: &Seen) {
-        let (id, manifest) = &now.version;
-        let version = before.map(|before| &before.version);
-        if version.is_none_or(|(old, _)| old != id) {
-            let touched = touched(version.map(|(_, old)| &**old), manifest);
-            tracing::info!(manifest = %id, periods = touched.len(), "a new version is shown");
-            self.state.news.tell(id.clone(), touched);
-        }
-        let Some(before) = before else {
-            return;
-        };
-        let others = [
-            (&before.lift, &now.lift),
-            (&before.northward, &now.northward),
-        ];
-        for (old, new) in others {
-            if let Some((new, manifest)) = new
-                && old.as_ref().is_none_or(|(old, _)| old != new)
-            {
-                let touched = touched(old.as_ref().map(|(_, old)| &**old), manifest);
-                self.state.news.tell(id.clone(), touched);
-            }
-        }
-    }
-}
-
-fn seen(layer: &Layer) -> Seen {
-    let version = |id: &ManifestId, manifest| (id.clone(), Arc::clone(manifest));
-    Seen {
-        version: version(&layer.id, &layer.manifest),
-        lift: layer
-            .accumulated
-            .as_ref()
-            .map(|lift| version(&lift.id, &lift.manifest)),
-        northward: layer
-            .northward
-            .as_ref()
-            .map(|part| version(&part.id, &part.manifest)),
     }
 }

@@ -17,13 +17,6 @@ impl ResponseForPanic for CountPanics {
 
     fn response_for_panic(&mut self, payload: Box<dyn Any + Send + 'static>) -> Response {
         self.0.inc();
-        let text = payload.downcast_ref::<String>().map(String::as_str);
-        let text = text
-            .or_else(|| payload.downcast_ref::<&str>().copied())
-            .unwrap_or("without a text");
-        ServerError::Defect {
-            what: format!("a handler panicked: {text}"),
-        }
-        .into_response()
+        ServerError::panicked("a handler", &*payload).into_response()
     }
 }

@@ -651,6 +651,8 @@ pub(crate) struct Log {
     pub(crate) inner: EmbeddedLog,
     pub(crate) followed: AtomicUsize,
     pub(crate) is_away: AtomicBool,
+    /// How often it was found away.
+    pub(crate) missed: AtomicUsize,
 }
 
 impl Default for Log {
@@ -659,6 +661,7 @@ impl Default for Log {
             inner: EmbeddedLog::memory(),
             followed: AtomicUsize::new(0),
             is_away: AtomicBool::new(false),
+            missed: AtomicUsize::new(0),
         }
     }
 }
@@ -666,6 +669,7 @@ impl Default for Log {
 impl Log {
     fn answers(&self) -> Result<(), StorageError> {
         if self.is_away.load(Ordering::SeqCst) {
+            self.missed.fetch_add(1, Ordering::SeqCst);
             return Err(StorageError::log("secret-broker:9092", "it is away"));
         }
         Ok(())

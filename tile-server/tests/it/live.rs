@@ -12,8 +12,8 @@ use contract::quantity::Quantity;
 use contract::time::TimeMs;
 use contract::topic::Topic;
 use service::Stop;
-use storage::StorageError;
 use storage::log::{EventLog as _, contents};
+use storage::{StorageError, manifests};
 use tokio::task::JoinHandle;
 
 use crate::app::TestApp;
@@ -54,6 +54,12 @@ impl Live {
 
     async fn follows(&self) {
         self.until(async || self.log.followed.load(Ordering::SeqCst) == TOPICS)
+            .await;
+    }
+
+    /// Its server has looked at what there is, and then found the log away.
+    async fn misses_its_log(&self) {
+        self.until(async || self.log.missed.load(Ordering::SeqCst) > 0)
             .await;
     }
 
@@ -280,8 +286,7 @@ async fn a_log_that_is_away_is_waited_for_and_what_landed_meanwhile_is_told() {
     log.is_away.store(true, Ordering::SeqCst);
     let live = Live::over(log).await;
     let mut viewer = Viewer::new(&live.app, None).await;
-    // The server has looked at what there is before it finds the log away.
-    tokio::time::sleep(Duration::from_millis(300)).await;
+    live.misses_its_log().await;
     let new = live
         .app
         .land_last_month("sst", Quantity::SeaSurfaceTemperature, 2, None)
@@ -291,6 +296,55 @@ async fn a_log_that_is_away_is_waited_for_and_what_landed_meanwhile_is_told() {
     let told = viewer.next().await.unwrap();
     assert_eq!(told.data["manifest"], new.to_string());
     assert_eq!(told.data["touched"][0]["start"], "2000-02-01T00:00:00Z");
+}
+
+#[tokio::test]
+async fn what_lifts_a_flux_since_the_log_was_away_is_news_of_it_and_is_drawn_when_it_is_heard_of() {
+    let log = Arc::new(Log::default());
+    log.is_away.store(true, Ordering::SeqCst);
+    let live = Live::over(log).await;
+    let (app, time) = (&live.app, "2000-03-20");
+    let mut viewer = Viewer::new(app, None).await;
+    app.get(&format!("/tiles/flux/volume/0/0/0.png?time={time}"))
+        .await;
+    live.misses_its_log().await;
+    let flux = manifests::latest(&app.store, &"flux".parse().unwrap()).await;
+    let flux = flux.unwrap().unwrap().id();
+    let (product, quantity) = ("flux-accumulated", Quantity::AccumulatedCarbon);
+    let lift = app
+        .land_last_month(product, quantity, 2, Some(flux.clone()))
+        .await;
+    live.log.is_away.store(false, Ordering::SeqCst);
+    let mut names = vec![];
+    for _ in 0..2 {
+        let told = viewer.next().await.unwrap();
+        names.push(told.data["manifest"].as_str().unwrap().to_owned());
+        assert_eq!(told.data["touched"][0]["start"], "2000-02-01T00:00:00Z");
+    }
+    names.sort();
+    assert_eq!(
+        names,
+        [lift.to_string(), flux.to_string()],
+        "it is lifted by something else now"
+    );
+    // It was appended after the server began to follow, and before it looked at what there is.
+    let derived = Body::ProductDerived {
+        manifest: lift,
+        derived_from: flux,
+    };
+    live.say(derived.clone()).await;
+    live.until(async || !live.orders().await.is_empty()).await;
+    let lifting = app.time_sample(product, time).await;
+    assert_eq!(live.orders().await[0].1.accumulated, Some(lifting));
+    // Heard again, it is drawn no more; and nothing of this is told twice.
+    live.say(derived).await;
+    let sst = app
+        .land_last_month("sst", Quantity::SeaSurfaceTemperature, 2, None)
+        .await;
+    live.landed(&sst).await;
+    let told = viewer.next().await.unwrap();
+    assert_eq!(told.data["manifest"], sst.to_string());
+    assert_eq!(live.orders().await.len(), 1);
 }
 
 #[tokio::test]

@@ -3,6 +3,7 @@
 use std::collections::VecDeque;
 use std::path::Path;
 use std::process::Stdio;
+use std::time::Duration;
 
 use contract::event::RejectReason;
 use serde::de::DeserializeOwned;
@@ -18,6 +19,8 @@ use crate::settings::Settings;
 
 /// Last words of a reader that are kept to tell why it died.
 const MAX_LAST_WORDS_BYTES: u64 = 4096;
+/// How long a reader that closed its output may take to be gone: one that dies closes it in that moment.
+const DYING: Duration = Duration::from_secs(5);
 /// Values that are taken from the reader at a time.
 const BLOCK_VALUES: usize = 1 << 17;
 
@@ -143,10 +146,11 @@ impl Session {
 
     async fn send(&mut self, request: &Request) -> Result<(), Stop> {
         let bytes = protocol::encode(request).map_err(|source| IngestError::Pipe { source })?;
-        if self.input.write_all(&bytes).await.is_err() {
-            return Err(self.post_mortem(Silence::Ended).await);
+        match tokio::time::timeout_at(self.deadline, self.input.write_all(&bytes)).await {
+            Ok(Ok(())) => Ok(()),
+            Ok(Err(_ended)) => Err(self.post_mortem(Silence::Ended).await),
+            Err(_late) => Err(self.post_mortem(Silence::Late).await),
         }
-        Ok(())
     }
 
     /// Reads values that nobody wants.
@@ -209,25 +213,25 @@ impl Session {
         let too_large =
             |detail: String| Stop::from(Rejection::new(RejectReason::TooLarge, "file", detail));
         if let Silence::Late = silence {
-            self.child
-                .start_kill()
-                .unwrap_or_else(|e| tracing::debug!(error = %e, "reader is gone already"));
+            self.kill();
             return too_large(format!(
                 "was not read within {} s; give it in smaller pieces",
                 wall.as_secs()
             ));
         }
-        let mut last_words = Vec::new();
-        if let Some(stderr) = self.child.stderr.take() {
-            let read = stderr
-                .take(MAX_LAST_WORDS_BYTES)
-                .read_to_end(&mut last_words)
-                .await;
-            read.map_or_else(|e| tracing::debug!(error = %e, "no last words"), |_| ());
-        }
-        let status = match self.child.wait().await {
-            Ok(status) => status,
-            Err(source) => return IngestError::Pipe { source }.into(),
+        let corrupt =
+            |detail: String| Stop::from(Rejection::new(RejectReason::Corrupt, "file", detail));
+        let limit = Instant::now() + DYING;
+        let last_words = self.last_words(limit).await;
+        let status = match tokio::time::timeout_at(limit, self.child.wait()).await {
+            Ok(Ok(status)) => status,
+            Ok(Err(source)) => return IngestError::Pipe { source }.into(),
+            Err(_alive) => {
+                self.kill();
+                let detail =
+                    "made its reader close its output and go on; it is damaged, fetch it again";
+                return corrupt(detail.to_owned());
+            }
         };
         let last_words = String::from_utf8_lossy(&last_words);
         let signal = std::os::unix::process::ExitStatusExt::signal(&status);
@@ -254,7 +258,73 @@ impl Session {
             return IngestError::Pipe { source }.into();
         }
         let cause = signal.map_or_else(|| status.to_string(), |n| format!("signal {n}"));
-        let detail = format!("made its reader stop ({cause}); it is damaged, fetch it again");
-        Rejection::new(RejectReason::Corrupt, "file", detail).into()
+        corrupt(format!(
+            "made its reader stop ({cause}); it is damaged, fetch it again"
+        ))
+    }
+
+    /// What the reader wrote to its standard error; what is there at `limit` if somebody holds that open.
+    async fn last_words(&mut self, limit: Instant) -> Vec<u8> {
+        let mut last_words = Vec::new();
+        if let Some(stderr) = self.child.stderr.take() {
+            let mut stderr = stderr.take(MAX_LAST_WORDS_BYTES);
+            let reading = stderr.read_to_end(&mut last_words);
+            match tokio::time::timeout_at(limit, reading).await {
+                Ok(Ok(_)) => {}
+                Ok(Err(e)) => tracing::debug!(error = %e, "no last words"),
+                Err(_open) => tracing::debug!("last words have no end"),
+            }
+        }
+        last_words
+    }
+
+    fn kill(&mut self) {
+        self.child
+            .start_kill()
+            .unwrap_or_else(|e| tracing::debug!(error = %e, "reader is gone already"));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A reader that reads nothing of what it is asked.
+    fn deaf(wall: Duration) -> Session {
+        let mut child = Command::new("sleep")
+            .arg("60")
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .kill_on_drop(true)
+            .spawn()
+            .unwrap();
+        let (input, output) = (child.stdin.take().unwrap(), child.stdout.take().unwrap());
+        Session {
+            child,
+            input,
+            output,
+            limits: Limits {
+                wall,
+                ..Limits::default()
+            },
+            deadline: Instant::now() + wall,
+            library_bytes: 0,
+            asked: VecDeque::new(),
+        }
+    }
+
+    #[tokio::test]
+    async fn a_reader_that_takes_no_requests_is_not_waited_for_beyond_its_time() {
+        let mut session = deaf(Duration::from_millis(300));
+        // More than a pipe holds.
+        let long = "v".repeat(1 << 20);
+        let asked = tokio::time::timeout(Duration::from_secs(30), session.ask(&long, &[]));
+        let refused = asked.await.expect("it is waited for").unwrap_err();
+        let Stop::Rejected(rejection) = refused else {
+            panic!("a fault of the program")
+        };
+        assert_eq!(rejection.reason, RejectReason::TooLarge);
+        assert!(session.child.wait().await.is_ok());
     }
 }

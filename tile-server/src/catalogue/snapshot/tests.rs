@@ -48,10 +48,11 @@ struct Looking {
 impl Looking {
     fn at(store: &Store) -> Self {
         let (store, traffic) = store.counted();
+        let metrics = Metrics::register(&Registry::new()).unwrap();
         Self {
             reader: Reader {
-                metrics: Metrics::register(&Registry::new()).unwrap(),
-                versions: Versions::new(store.clone()),
+                versions: Versions::new(store.clone(), &metrics.panics),
+                metrics,
                 store,
             },
             traffic,
