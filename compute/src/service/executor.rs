@@ -45,15 +45,12 @@ use super::background::Background;
 use super::executor_metrics::CountedEngine;
 use super::executor_settings::ExecutorSettings;
 use super::heartbeat;
+use super::janitor::Janitor;
 use super::retry_channel::RetryChannel;
 use super::scheduler::store_part;
 use super::work::WorkFolder;
 use crate::{ComputeError, Objects, state};
 
-/// How often the work folder is looked at.
-const TIDY_INTERVAL: Duration = Duration::from_secs(10);
-/// Intermediate results that nobody wrote to for so long belong to queries that nobody remembers.
-const FORGOTTEN: Duration = Duration::from_hours(2);
 /// How often an executor without a task asks for one.
 const IDLE_ASK: Duration = Duration::from_millis(25);
 /// And one that works on some: it reports those that ended with its questions.
@@ -331,41 +328,6 @@ async fn tell_gone(retry_channel: RetryChannel, gone: Vec<String>) {
             tokio::time::sleep(pauses.next().unwrap_or(AWAY)).await;
         }
         tracing::info!(executor = id, "told the scheduler that an executor is gone");
-    }
-}
-
-/// Removes forgotten intermediate results, and takes no new task while there are too many others.
-struct Janitor {
-    work: Arc<WorkFolder>,
-    work_bytes: IntGauge,
-    limit_bytes: u64,
-    hands: Arc<Semaphore>,
-}
-
-impl Janitor {
-    async fn run(self) {
-        let mut held = vec![];
-        loop {
-            let work = Arc::clone(&self.work);
-            let tidied = tokio::task::spawn_blocking(move || work.tidy(FORGOTTEN)).await;
-            let bytes = tidied.unwrap_or(0);
-            self.work_bytes.set(bytes as i64);
-            if bytes <= self.limit_bytes {
-                held.clear();
-            } else {
-                let limit_bytes = self.limit_bytes;
-                tracing::warn!(
-                    bytes,
-                    limit_bytes,
-                    "too many intermediate results: no new task"
-                );
-                // Hands that are busy now are taken the next time.
-                while let Ok(hand) = Arc::clone(&self.hands).try_acquire_owned() {
-                    held.push(hand);
-                }
-            }
-            tokio::time::sleep(TIDY_INTERVAL).await;
-        }
     }
 }
 
