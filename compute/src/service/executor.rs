@@ -6,6 +6,7 @@
 
 use std::net::SocketAddr;
 use std::num::NonZeroUsize;
+use std::pin::pin;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -204,7 +205,10 @@ impl Executor {
                 ended = &mut janitor.0 => return ended_early(ended.map(Ok)),
             }
             let limit = Duration::from_secs(self.settings.executor_drain_s);
-            drain(&hands, self.settings.tasks(), &self.retry_channel, limit).await;
+            let tasks = self.settings.tasks();
+            if !drain(janitor, &hands, tasks, &self.retry_channel, limit).await {
+                tracing::warn!("stopping while tasks run; the scheduler gives them to others");
+            }
             let id = &self.registration.id;
             if let Err(error) = self
                 .retry_channel
@@ -293,8 +297,15 @@ async fn keep_asking(hands: Arc<Semaphore>, tasks: usize, nudge: Arc<Notify>) {
     }
 }
 
-/// Takes no more tasks and waits for those under way, and then for the report on the last of them.
-async fn drain(hands: &Semaphore, tasks: usize, retry_channel: &RetryChannel, limit: Duration) {
+/// Takes no more tasks and waits for those under way, and then for the report on the last of them. Have they ended within the
+/// limit? Hands that the janitor held back work on none.
+async fn drain(
+    janitor: Background<()>,
+    hands: &Semaphore,
+    tasks: usize,
+    retry_channel: &RetryChannel,
+    limit: Duration,
+) -> bool {
     let is_idle = || hands.available_permits() == tasks;
     let was_idle = is_idle();
     if was_idle {
@@ -302,13 +313,20 @@ async fn drain(hands: &Semaphore, tasks: usize, retry_channel: &RetryChannel, li
         reported(retry_channel, IDLE_REPORT).await;
     }
     let is_still_idle = was_idle && is_idle();
-    let Ok(Ok(_held)) = tokio::time::timeout(limit, hands.acquire_many(tasks as u32)).await else {
-        tracing::warn!("stopping while tasks run; the scheduler gives them to others");
-        return;
+    let mut all = pin!(hands.acquire_many(tasks as u32));
+    let held = tokio::select! {
+        // In line before the janitor lets go: else the loop that asks for tasks would see free hands.
+        biased;
+        held = &mut all => Ok(held),
+        () = janitor.end() => tokio::time::timeout(limit, all).await,
+    };
+    let Ok(Ok(_held)) = held else {
+        return false;
     };
     if !is_still_idle {
         reported(retry_channel, LAST_REPORT.min(limit)).await;
     }
+    true
 }
 
 /// Waits for two requests to be answered: the one under way may have been made before the last task ended.
@@ -369,5 +387,34 @@ impl Readiness for ExecutorReadiness {
             Part::required("scheduler", seen).await,
             store_part(&self.store).await,
         ]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use tonic::transport::Endpoint;
+
+    use super::super::janitor::tests::over_its_limit;
+    use super::*;
+
+    #[tokio::test]
+    async fn hands_that_are_held_back_are_no_tasks_that_are_waited_for() {
+        let root = tempfile::tempdir().unwrap();
+        let channel = Endpoint::from_static("http://127.0.0.1:1").connect_lazy();
+        let retry_channel = RetryChannel::new(channel, "a");
+        let hands = Arc::new(Semaphore::new(2));
+        let limit = Duration::from_secs(1);
+        let busy = Arc::clone(&hands).try_acquire_owned().unwrap();
+        let folder = root.path().join("busy");
+        let janitor = over_its_limit(&hands, &folder).await;
+        let have_ended = drain(janitor, &hands, 2, &retry_channel, limit).await;
+        assert!(!have_ended, "a task is not waited for");
+        drop(busy);
+        for limit in [Duration::ZERO, limit] {
+            let folder = root.path().join(format!("{limit:?}"));
+            let janitor = over_its_limit(&hands, &folder).await;
+            let have_ended = drain(janitor, &hands, 2, &retry_channel, limit).await;
+            assert!(have_ended, "it waits for nothing for {limit:?}");
+        }
     }
 }
