@@ -11,6 +11,7 @@ pub mod executor;
 mod executor_metrics;
 mod executor_settings;
 mod heartbeat;
+mod janitor;
 mod named_sums;
 mod retry_channel;
 mod room;

@@ -84,7 +84,8 @@ impl ConsumerQueue {
         self.topic
     }
 
-    fn give(&self, partition: u32) {
+    /// Takes in a partition that is this member's from now on.
+    pub(crate) fn give(&self, partition: u32) {
         let mut state = self.state();
         state.given += 1;
         let owned = Owned {

@@ -65,12 +65,7 @@ async fn poll(
         tokio::select! {
             biased;
             _ended = &mut stopped => return Ok(()),
-            () = queue.room.notified(), if is_paused => {
-                if queue.has_room() {
-                    consumer.resume(&consumer.assignment()?)?;
-                    is_paused = false;
-                }
-            }
+            () = queue.room.notified(), if is_paused => {}
             next = received.next() => match next.expect("a stream of messages has no end") {
                 Ok(message) => {
                     // Partitions given while paused are not paused yet: their first message pauses them.
@@ -91,6 +86,10 @@ async fn poll(
                 Err(error) => tracing::debug!(%error, topic = %queue.topic(), "fetching is disturbed"),
             },
         }
+        if may_resume(is_paused, queue) {
+            consumer.resume(&consumer.assignment()?)?;
+            is_paused = false;
+        }
         // Messages that are there already must not keep others from running.
         tokio::task::consume_budget().await;
     }
@@ -105,6 +104,12 @@ async fn gets_room_soon(queue: &ConsumerQueue) -> bool {
         }
     };
     tokio::time::timeout(PAUSE_AFTER, room).await.is_ok()
+}
+
+/// Does fetching that is paused go on? Looked at after whatever came, not only when `room` rings: whoever waited for room for a message
+/// heard it, and it does not ring again for a reader that finds nothing.
+fn may_resume(is_paused: bool, queue: &ConsumerQueue) -> bool {
+    is_paused && queue.has_room()
 }
 
 /// A message with its place. One that is too long for an event is cut: it is refused as such, and not held whole.
@@ -123,5 +128,48 @@ pub(crate) fn of_topic(topic: Topic, message: &BorrowedMessage<'_>) -> Message {
             .timestamp()
             .to_millis()
             .and_then(|ms| TimeMs::new(ms).ok()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use futures::{FutureExt as _, future};
+
+    use super::*;
+
+    fn message(partition: u32, offset: u64) -> Message {
+        Message {
+            origin: Origin {
+                topic: Topic::GranuleNotice,
+                partition,
+                offset,
+            },
+            content: Bytes::from(vec![b'x'; 1 << 20]),
+            time: None,
+        }
+    }
+
+    #[tokio::test]
+    async fn fetching_goes_on_though_the_one_ring_of_room_was_heard_for_another_partition() {
+        let queue = ConsumerQueue::new(Topic::GranuleNotice);
+        queue.give(0);
+        let full = (0..1000).find(|&offset| queue.put(message(0, offset)));
+        assert!(
+            full.is_some(),
+            "it pauses for bytes, below what is handed out"
+        );
+        // Fetching is paused. Another partition is given, whose first message finds no room, until all is taken out at once.
+        queue.give(1);
+        assert!(queue.put(message(1, 0)));
+        assert!(!may_resume(true, &queue), "there is no room");
+        let read = async { queue.hand_out(64).unwrap().len() };
+        let (has_room, count) = future::join(gets_room_soon(&queue), read).await;
+        assert!(has_room);
+        assert_eq!(count as u64, full.unwrap() + 2, "all of them");
+        assert!(queue.hand_out(64).unwrap().is_empty());
+        let rings = queue.room.notified().now_or_never();
+        assert!(rings.is_none(), "nobody would have to look");
+        assert!(may_resume(true, &queue));
+        assert!(!may_resume(false, &queue), "it is not paused");
     }
 }

@@ -1,7 +1,8 @@
 //! SQL as analysts ask it: the examples of docs/sql.md, the forms of answers as others read them, refusals, Flight SQL.
 
+use std::io::Read as _;
 use std::path::Path;
-use std::process::{Command, Stdio};
+use std::process::{Child, Command, Stdio};
 
 use harness::program;
 use serde_json::Value;
@@ -209,13 +210,26 @@ fn bad_questions_and_impossible_forms_are_told_in_a_line() {
     }
 }
 
+const ENDLESS: &str =
+    "SELECT a.value FROM takahashi09_flux a, takahashi09_flux b, takahashi09_flux c";
+
+/// Interrupts a question as Ctrl-C does; what it tells at its end.
+fn told_when_interrupted(child: Child) -> String {
+    let interrupt = Command::new("kill")
+        .args(["-INT", &child.id().to_string()])
+        .status();
+    assert!(interrupt.unwrap().success());
+    let output = child.wait_with_output().unwrap();
+    assert!(!output.status.success());
+    String::from_utf8(output.stderr).unwrap()
+}
+
 #[test]
 fn an_interrupted_question_leaves_no_file() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("all.csv");
-    let endless = "SELECT a.value FROM takahashi09_flux a, takahashi09_flux b, takahashi09_flux c";
-    let mut child = program::command(demo_data())
-        .args(["sql", endless, "--output", path.to_str().unwrap()])
+    let child = program::command(demo_data())
+        .args(["sql", ENDLESS, "--output", path.to_str().unwrap()])
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
@@ -225,13 +239,25 @@ fn an_interrupted_question_leaves_no_file() {
         assert!(begun.elapsed().as_secs() < 60, "nothing is written");
         std::thread::sleep(std::time::Duration::from_millis(20));
     }
-    let interrupt = Command::new("kill")
-        .args(["-INT", &child.id().to_string()])
-        .status();
-    assert!(interrupt.unwrap().success());
-    let output = child.wait().unwrap();
-    assert!(!output.success());
+    let told = told_when_interrupted(child);
+    assert!(told.contains("nothing was written"), "{told}");
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+}
+
+#[test]
+fn an_interrupted_question_says_that_rows_on_standard_output_are_not_all() {
+    let mut child = program::command(demo_data())
+        .args(["sql", ENDLESS, "--format", "csv"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut first = [0; 7];
+    let rows = child.stdout.as_mut().unwrap();
+    rows.read_exact(&mut first).unwrap();
+    let told = told_when_interrupted(child);
+    assert!(told.contains("may not be whole"), "{told}");
+    assert!(!told.contains("nothing was written"), "{told}");
 }
 
 #[test]

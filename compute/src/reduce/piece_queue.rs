@@ -1,16 +1,22 @@
 //! Pieces of a question, which some threads work off one after the other: each takes the next one when it has reduced the last, and
 //! nothing is handed from thread to thread in between.
 
+use std::iter;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use tokio::runtime::Handle;
+use tokio::sync::{Semaphore, SemaphorePermit};
 use tokio::task::{JoinHandle, spawn_blocking};
 
 use super::accumulator::Accumulated;
 use super::question::Piece;
 use crate::ComputeError;
 
-/// Reads a piece and reduces it.
+/// Threads that questions of this process work on at a time: half of the 512 that a runtime has for what blocks. Each of them waits for
+/// reads, which need threads of the same runtime: were all of these questions', none of them would ever end.
+static THREADS: Semaphore = Semaphore::const_new(256);
+
+/// Reads a piece and reduces it. It must not ask for what pieces come to in turn: it would wait for a thread on a thread.
 pub(super) trait Reduce:
     AsyncFn(Piece) -> Result<Accumulated, ComputeError> + Send + Sync + 'static
 {
@@ -57,7 +63,7 @@ impl Drop for Awaited {
     }
 }
 
-/// What all pieces come to, reduced by as many threads as `at_once`, which `reduce` keeps busy.
+/// What all pieces come to, reduced by as many threads as `at_once`, which `reduce` keeps busy; by fewer where other questions have theirs.
 ///
 /// # Errors
 /// As `reduce`; sums that leave their range.
@@ -66,16 +72,31 @@ pub(super) async fn reduced(
     pieces: Vec<Piece>,
     at_once: usize,
 ) -> Result<Accumulated, ComputeError> {
+    reduced_on(&THREADS, reduce, pieces, at_once).await
+}
+
+async fn reduced_on(
+    free: &'static Semaphore,
+    reduce: impl Reduce,
+    pieces: Vec<Piece>,
+    at_once: usize,
+) -> Result<Accumulated, ComputeError> {
     let thread_count = at_once.clamp(1, pieces.len().max(1));
     let queue = Arc::new(PieceQueue(Mutex::new(pieces.into_iter())));
     let awaited = Awaited(Arc::clone(&queue));
+    // One is waited for, so that every question has its turn, and no more: who waits holds nothing that others wait for.
+    let first = free.acquire().await.expect("nobody closes it");
     let reduce = Arc::new(reduce);
-    let thread = |_number: usize| {
+    let thread = |permit: SemaphorePermit<'static>| {
         let (reduce, queue) = (Arc::clone(&reduce), Arc::clone(&queue));
         let runtime = Handle::current();
-        spawn_blocking(move || runtime.block_on(queue.work_off(&*reduce)))
+        spawn_blocking(move || {
+            let _permit = permit;
+            runtime.block_on(queue.work_off(&*reduce))
+        })
     };
-    let threads: Vec<JoinHandle<_>> = (0..thread_count).map(thread).collect();
+    let more = (1..thread_count).map_while(|_number| free.try_acquire().ok());
+    let threads: Vec<JoinHandle<_>> = iter::once(first).chain(more).map(thread).collect();
     let mut all = Accumulated::default();
     for thread in threads {
         let part = thread.await;
@@ -93,7 +114,10 @@ mod tests {
 
     use contract::digest::Digest;
     use contract::key::ObjectKey;
-    use tokio::sync::{Notify, Semaphore, oneshot};
+    use futures::future;
+    use tokio::runtime::Builder;
+    use tokio::sync::{Notify, oneshot};
+    use tokio::time::timeout;
 
     use super::super::accumulator::StepSums;
     use super::super::question::Layout;
@@ -253,5 +277,37 @@ mod tests {
         let is_over = tokio::time::timeout(LIMIT, has_ended).await;
         assert!(is_over.is_ok(), "its thread is still there");
         assert_eq!(count.load(Ordering::SeqCst), 1, "the piece that it was at");
+    }
+
+    /// A runtime of four threads for what blocks, and what is asked in it within the limit.
+    fn in_four_threads<T>(asked: impl Future<Output = T>) -> Option<T> {
+        let runtime = Builder::new_multi_thread()
+            .worker_threads(2)
+            .max_blocking_threads(4)
+            .enable_time()
+            .build()
+            .unwrap();
+        let answer = runtime.block_on(async { timeout(LIMIT, asked).await.ok() });
+        // Threads that wait for each other would be waited for.
+        runtime.shutdown_background();
+        answer
+    }
+
+    #[test]
+    fn questions_leave_threads_for_what_they_read() {
+        static HALF: Semaphore = Semaphore::const_new(2);
+        let asked = (0..8).map(|_question| {
+            let reduce = async |piece: Piece| {
+                let read = spawn_blocking(move || sums_of(&piece, 1));
+                Ok(read.await.unwrap())
+            };
+            reduced_on(&HALF, reduce, pieces(20), 4)
+        });
+        let all = in_four_threads(future::join_all(asked));
+        let all = all.expect("threads wait for reads that have no thread");
+        for one in all {
+            assert_eq!(one.unwrap().steps.len(), 20);
+        }
+        assert_eq!(HALF.available_permits(), 2, "a thread is not given back");
     }
 }

@@ -6,6 +6,7 @@
 
 use std::net::SocketAddr;
 use std::num::NonZeroUsize;
+use std::pin::pin;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -45,15 +46,12 @@ use super::background::Background;
 use super::executor_metrics::CountedEngine;
 use super::executor_settings::ExecutorSettings;
 use super::heartbeat;
+use super::janitor::Janitor;
 use super::retry_channel::RetryChannel;
 use super::scheduler::store_part;
 use super::work::WorkFolder;
 use crate::{ComputeError, Objects, state};
 
-/// How often the work folder is looked at.
-const TIDY_INTERVAL: Duration = Duration::from_secs(10);
-/// Intermediate results that nobody wrote to for so long belong to queries that nobody remembers.
-const FORGOTTEN: Duration = Duration::from_hours(2);
 /// How often an executor without a task asks for one.
 const IDLE_ASK: Duration = Duration::from_millis(25);
 /// And one that works on some: it reports those that ended with its questions.
@@ -207,7 +205,10 @@ impl Executor {
                 ended = &mut janitor.0 => return ended_early(ended.map(Ok)),
             }
             let limit = Duration::from_secs(self.settings.executor_drain_s);
-            drain(&hands, self.settings.tasks(), &self.retry_channel, limit).await;
+            let tasks = self.settings.tasks();
+            if !drain(janitor, &hands, tasks, &self.retry_channel, limit).await {
+                tracing::warn!("stopping while tasks run; the scheduler gives them to others");
+            }
             let id = &self.registration.id;
             if let Err(error) = self
                 .retry_channel
@@ -296,8 +297,15 @@ async fn keep_asking(hands: Arc<Semaphore>, tasks: usize, nudge: Arc<Notify>) {
     }
 }
 
-/// Takes no more tasks and waits for those under way, and then for the report on the last of them.
-async fn drain(hands: &Semaphore, tasks: usize, retry_channel: &RetryChannel, limit: Duration) {
+/// Takes no more tasks and waits for those under way, and then for the report on the last of them. Have they ended within the
+/// limit? Hands that the janitor held back work on none.
+async fn drain(
+    janitor: Background<()>,
+    hands: &Semaphore,
+    tasks: usize,
+    retry_channel: &RetryChannel,
+    limit: Duration,
+) -> bool {
     let is_idle = || hands.available_permits() == tasks;
     let was_idle = is_idle();
     if was_idle {
@@ -305,13 +313,20 @@ async fn drain(hands: &Semaphore, tasks: usize, retry_channel: &RetryChannel, li
         reported(retry_channel, IDLE_REPORT).await;
     }
     let is_still_idle = was_idle && is_idle();
-    let Ok(Ok(_held)) = tokio::time::timeout(limit, hands.acquire_many(tasks as u32)).await else {
-        tracing::warn!("stopping while tasks run; the scheduler gives them to others");
-        return;
+    let mut all = pin!(hands.acquire_many(tasks as u32));
+    let held = tokio::select! {
+        // In line before the janitor lets go: else the loop that asks for tasks would see free hands.
+        biased;
+        held = &mut all => Ok(held),
+        () = janitor.end() => tokio::time::timeout(limit, all).await,
+    };
+    let Ok(Ok(_held)) = held else {
+        return false;
     };
     if !is_still_idle {
         reported(retry_channel, LAST_REPORT.min(limit)).await;
     }
+    true
 }
 
 /// Waits for two requests to be answered: the one under way may have been made before the last task ended.
@@ -331,41 +346,6 @@ async fn tell_gone(retry_channel: RetryChannel, gone: Vec<String>) {
             tokio::time::sleep(pauses.next().unwrap_or(AWAY)).await;
         }
         tracing::info!(executor = id, "told the scheduler that an executor is gone");
-    }
-}
-
-/// Removes forgotten intermediate results, and takes no new task while there are too many others.
-struct Janitor {
-    work: Arc<WorkFolder>,
-    work_bytes: IntGauge,
-    limit_bytes: u64,
-    hands: Arc<Semaphore>,
-}
-
-impl Janitor {
-    async fn run(self) {
-        let mut held = vec![];
-        loop {
-            let work = Arc::clone(&self.work);
-            let tidied = tokio::task::spawn_blocking(move || work.tidy(FORGOTTEN)).await;
-            let bytes = tidied.unwrap_or(0);
-            self.work_bytes.set(bytes as i64);
-            if bytes <= self.limit_bytes {
-                held.clear();
-            } else {
-                let limit_bytes = self.limit_bytes;
-                tracing::warn!(
-                    bytes,
-                    limit_bytes,
-                    "too many intermediate results: no new task"
-                );
-                // Hands that are busy now are taken the next time.
-                while let Ok(hand) = Arc::clone(&self.hands).try_acquire_owned() {
-                    held.push(hand);
-                }
-            }
-            tokio::time::sleep(TIDY_INTERVAL).await;
-        }
     }
 }
 
@@ -407,5 +387,34 @@ impl Readiness for ExecutorReadiness {
             Part::required("scheduler", seen).await,
             store_part(&self.store).await,
         ]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use tonic::transport::Endpoint;
+
+    use super::super::janitor::tests::over_its_limit;
+    use super::*;
+
+    #[tokio::test]
+    async fn hands_that_are_held_back_are_no_tasks_that_are_waited_for() {
+        let root = tempfile::tempdir().unwrap();
+        let channel = Endpoint::from_static("http://127.0.0.1:1").connect_lazy();
+        let retry_channel = RetryChannel::new(channel, "a");
+        let hands = Arc::new(Semaphore::new(2));
+        let limit = Duration::from_secs(1);
+        let busy = Arc::clone(&hands).try_acquire_owned().unwrap();
+        let folder = root.path().join("busy");
+        let janitor = over_its_limit(&hands, &folder).await;
+        let have_ended = drain(janitor, &hands, 2, &retry_channel, limit).await;
+        assert!(!have_ended, "a task is not waited for");
+        drop(busy);
+        for limit in [Duration::ZERO, limit] {
+            let folder = root.path().join(format!("{limit:?}"));
+            let janitor = over_its_limit(&hands, &folder).await;
+            let have_ended = drain(janitor, &hands, 2, &retry_channel, limit).await;
+            assert!(have_ended, "it waits for nothing for {limit:?}");
+        }
     }
 }

@@ -1,7 +1,9 @@
 //! `fluxglobe sql`: a question as text in; a table, CSV, JSON, or a file that other programs open out.
 
+use std::cell::Cell;
 use std::io::{IsTerminal as _, Read as _, Write};
 use std::path::Path;
+use std::pin::pin;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
@@ -26,11 +28,41 @@ pub(crate) async fn run(settings: &Settings, options: &SqlQuestion) -> Result<()
         &deployment::in_process(settings, store),
         options.limits.limits(),
     )?;
+    let reached = Cell::new(Reached::Nothing);
+    let answered = answered(&sql, &text, options, form, &reached);
+    unless_cancelled(answered, &reached, tokio::signal::ctrl_c()).await
+}
+
+/// How far an answer has come, and with it what is said of one that is cancelled.
+#[derive(Debug, Clone, Copy)]
+enum Reached {
+    /// Nobody sees anything of it: a table is printed at its end, and a file without a name goes with the program.
+    Nothing,
+    /// Standard output may have some of it.
+    Streamed,
+    /// A file is made whole and named, on a thread of its own.
+    Finishing,
+}
+
+/// An answer, unless it is cancelled before. Once its file is made whole it is not: nobody could say whether the file is there.
+async fn unless_cancelled(
+    answered: impl Future<Output = Result<()>>,
+    reached: &Cell<Reached>,
+    cancelled: impl Future<Output = std::io::Result<()>>,
+) -> Result<()> {
+    let mut answered = pin!(answered);
     tokio::select! {
-        ended = answered(&sql, &text, options, form) => ended,
-        asked = tokio::signal::ctrl_c() => {
-            asked?;
-            bail!("cancelled; nothing was written")
+        // Listened to before anything is written.
+        biased;
+        asked = cancelled => asked?,
+        ended = &mut answered => return ended,
+    }
+    match reached.get() {
+        Reached::Nothing => bail!("cancelled; nothing was written"),
+        Reached::Streamed => bail!("cancelled; what was written so far may not be whole"),
+        Reached::Finishing => {
+            progress::say("too late to cancel: the file is being made whole");
+            answered.await
         }
     }
 }
@@ -40,12 +72,13 @@ async fn answered(
     text: &str,
     options: &SqlQuestion,
     form: Option<AnswerFormat>,
+    reached: &Cell<Reached>,
 ) -> Result<()> {
     let begun = Instant::now();
     let rows = sql.ask(text).await?;
     let count = match form {
         None => table(rows, options.max_rows as usize).await?,
-        Some(form) => written(rows, form, options.output.as_deref()).await?,
+        Some(form) => written(rows, form, options.output.as_deref(), reached).await?,
     };
     let seconds = begun.elapsed().as_secs_f64();
     progress::say(&format!("{count} ({seconds:.1} s)"));
@@ -136,7 +169,12 @@ async fn table(mut rows: Rows, most: usize) -> Result<String> {
 }
 
 /// Writes rows, each batch on a thread for what blocks.
-async fn written(mut rows: Rows, form: AnswerFormat, output: Option<&Path>) -> Result<String> {
+async fn written(
+    mut rows: Rows,
+    form: AnswerFormat,
+    output: Option<&Path>,
+    reached: &Cell<Reached>,
+) -> Result<String> {
     let is_gone = Arc::new(AtomicBool::new(false));
     let to = match output {
         Some(path) => Destination::File(path.to_owned()),
@@ -145,6 +183,9 @@ async fn written(mut rows: Rows, form: AnswerFormat, output: Option<&Path>) -> R
         })),
     };
     let writing = async {
+        if output.is_none() {
+            reached.set(Reached::Streamed);
+        }
         let mut file = answer::answer(form, to, rows.schema())?;
         let mut count = 0;
         while let Some(batch) = rows.next().await? {
@@ -154,6 +195,9 @@ async fn written(mut rows: Rows, form: AnswerFormat, output: Option<&Path>) -> R
                 Ok::<_, export::ExportError>(file)
             });
             file = append.await??;
+        }
+        if output.is_some() {
+            reached.set(Reached::Finishing);
         }
         tokio::task::spawn_blocking(move || file.finish()).await??;
         Ok::<_, anyhow::Error>(count)
@@ -201,5 +245,39 @@ impl Write for Out {
 
     fn flush(&mut self) -> std::io::Result<()> {
         self.noticed(std::io::stdout().flush())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::future;
+
+    use super::*;
+
+    #[tokio::test]
+    async fn an_answer_that_is_cancelled_says_what_is_there_of_it() {
+        for (reached, wanted) in [
+            (Reached::Nothing, "nothing was written"),
+            (Reached::Streamed, "may not be whole"),
+        ] {
+            let cancelled = future::ready(Ok(()));
+            let reached = Cell::new(reached);
+            let ended = unless_cancelled(future::pending(), &reached, cancelled).await;
+            let told = ended.unwrap_err().to_string();
+            assert!(told.contains(wanted), "{told}");
+        }
+    }
+
+    #[tokio::test]
+    async fn a_file_that_is_made_whole_is_not_cancelled() {
+        let is_whole = Cell::new(false);
+        let finishing = async {
+            tokio::task::yield_now().await;
+            is_whole.set(true);
+            Ok(())
+        };
+        let reached = Cell::new(Reached::Finishing);
+        let ended = unless_cancelled(finishing, &reached, future::ready(Ok(()))).await;
+        assert!(ended.is_ok() && is_whole.get(), "{ended:?}");
     }
 }
