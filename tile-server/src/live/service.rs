@@ -184,7 +184,7 @@ impl LiveService {
     }
 
     /// The times that a version touches since tiles were ordered; none if that was after this version.
-    fn to_order(&mut self, layer: &Layer) -> Option<Vec<Period>> {
+    fn begin_order(&mut self, layer: &Layer) -> Option<Vec<Period>> {
         let product = layer.manifest.product.clone();
         let before = self.ordered.insert(product, version(layer));
         if before.as_ref().is_some_and(|(id, _)| *id == layer.id) {
@@ -209,7 +209,7 @@ impl LiveService {
             }
         };
         self.tell(&layer);
-        let Some(touched) = self.to_order(&layer) else {
+        let Some(touched) = self.begin_order(&layer) else {
             return Ok(None);
         };
         tracing::info!(trace = event.trace, %manifest, periods = touched.len(), "a new version is shown");
