@@ -697,6 +697,30 @@ mod tests {
     }
 
     #[test]
+    fn isolines_of_what_has_nothing_between_two_values_are_refused() {
+        let mut job = job();
+        job.mode = Mode::Map;
+        let tenth = (job.style.transfer.high - job.style.transfer.low) / 10.0;
+        job.style.context.isolines = Some(every(tenth));
+        job.validate().unwrap();
+        job.style.nearest = true;
+        let refused = job.validate().unwrap_err().to_string();
+        assert!(refused.contains("codes, directions and days"), "{refused}");
+        job.style.context.isolines = None;
+        job.validate().unwrap();
+    }
+
+    #[test]
+    fn a_look_with_a_word_that_is_not_known_is_refused_and_not_drawn_without_it() {
+        let mut told = serde_json::to_value(job()).unwrap();
+        let read = |told: &serde_json::Value| serde_json::from_str::<RenderJob>(&told.to_string());
+        assert_eq!(read(&told).unwrap(), job());
+        told["style"]["glow"] = true.into();
+        let refused = read(&told).unwrap_err().to_string();
+        assert!(refused.contains("unknown field `glow`"), "{refused}");
+    }
+
+    #[test]
     fn jobs_beyond_a_limit_are_refused() {
         let globe = |height_m, width_px| View::Globe {
             lon_deg: 0.0,
