@@ -159,3 +159,109 @@ fn in_words(statistic: MapStatistic) -> String {
         other => format!("percentiles ({other})"),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use contract::computed::Computed;
+    use contract::grid::Grid;
+    use contract::manifest::MANIFEST_SCHEMA;
+    use contract::quantity::{Flag, OpenQuantity, OpenWords};
+
+    use super::*;
+
+    /// A product that landed from a file: nothing but its quantity says what it is.
+    fn landed(quantity: Quantity) -> Manifest {
+        Manifest {
+            schema: MANIFEST_SCHEMA,
+            product: "p".parse().unwrap(),
+            number: 1,
+            title: "P".to_owned(),
+            quantity,
+            synthetic: true,
+            source: "made by a test".to_owned(),
+            grid: Grid {
+                rows: 2,
+                cols: 4,
+                north_deg: 90.0,
+                west_deg: -180.0,
+                dlat_deg: 90.0,
+                dlon_deg: 90.0,
+            },
+            steps: vec![],
+            domain: "domain/p/d".parse().unwrap(),
+            series: vec![],
+            derived_from: None,
+            computed: None,
+            notices: vec![],
+        }
+    }
+
+    fn computed(quantity: Quantity, how: Computation) -> Manifest {
+        let computed = Computed {
+            how,
+            inputs: vec![],
+            from: None,
+            to: None,
+            map: None,
+        };
+        Manifest {
+            computed: Some(computed),
+            ..landed(quantity)
+        }
+    }
+
+    fn in_days(name: &str) -> Quantity {
+        Quantity::open(name, "day", "A day").unwrap()
+    }
+
+    fn mask() -> Quantity {
+        let Quantity::Open(plain) = Quantity::open("basin", "1", "Basin").unwrap() else {
+            panic!("a basin is built in");
+        };
+        let flag = Flag {
+            value: 5,
+            meaning: "southern".to_owned(),
+        };
+        let words = OpenWords {
+            flags: vec![flag],
+            ..plain.words().clone()
+        };
+        Quantity::Open(OpenQuantity::new(words).unwrap())
+    }
+
+    #[test]
+    fn what_has_no_means_is_brought_to_another_grid_by_single_cells_wherever_it_comes_from() {
+        let phase = || in_days("sea_surface_temperature_annual_phase");
+        let regridded = Computation::Regrid {
+            method: Regridding::Nearest,
+            min_coverage: 0.5,
+        };
+        let single = [
+            landed(phase()),
+            computed(phase(), regridded),
+            landed(mask()),
+        ];
+        for manifest in single {
+            let usual = usual_regridding(&manifest);
+            assert_eq!(usual, Regridding::Nearest, "{:?}", manifest.quantity);
+            check_regridded(&manifest, usual).unwrap();
+            for method in [Regridding::Bilinear, Regridding::Conservative] {
+                let refused = check_regridded(&manifest, method);
+                assert!(refused.is_err(), "{method} {:?}", manifest.quantity);
+            }
+        }
+        for quantity in [Quantity::CarbonFlux, in_days("first_day_of_ice")] {
+            let manifest = landed(quantity);
+            assert_eq!(usual_regridding(&manifest), Regridding::Conservative);
+            check_regridded(&manifest, Regridding::Conservative).unwrap();
+        }
+    }
+
+    #[test]
+    fn days_of_the_year_have_no_mean() {
+        let phase = landed(in_days("sea_surface_temperature_annual_phase"));
+        let refused = check_averaged(&phase).unwrap_err().to_string();
+        assert!(refused.contains("which go round"), "{refused}");
+        check_averaged(&landed(in_days("first_day_of_ice"))).unwrap();
+    }
+}
