@@ -397,3 +397,6 @@ fn citation(how: &Computation, inputs: &[Input]) -> String {
     };
     format!("{what}; {}", inputs.join("; "))
 }
+
+#[cfg(test)]
+mod tests;

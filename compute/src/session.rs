@@ -380,7 +380,26 @@ impl Inner {
 
 #[cfg(test)]
 mod tests {
+    use datafusion::execution::FunctionRegistry as _;
+    use datafusion::logical_expr::ScalarUDF;
+
     use super::*;
+
+    impl Engine {
+        /// The same engine, which works in this process, with a function of a test in the place of its own of that name.
+        pub(crate) async fn with_function(&self, function: ScalarUDF) -> Self {
+            let mut session = self.inner.start().await.unwrap();
+            session.state.register_udf(Arc::new(function)).unwrap();
+            let inner = &self.inner;
+            self.with(Inner {
+                kind: inner.kind.clone(),
+                session: OnceCell::from(session),
+                store: inner.store.clone(),
+                objects: inner.objects.clone(),
+                ..**inner
+            })
+        }
+    }
 
     /// Name of the operator at the top of a query's plan.
     async fn top_of_plan(engine: &Engine) -> String {
