@@ -168,3 +168,105 @@ fn failed(error: CubeError) -> ServerError {
         },
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use contract::grid::Grid;
+    use contract::quantity::Quantity;
+    use contract::time::Period;
+    use cube::{Description, Edit};
+    use futures::FutureExt as _;
+
+    use super::*;
+    use crate::gate::Pass;
+
+    const KEY: &str = "zarr.json";
+
+    /// A cube of one month.
+    async fn keys(store: &Store) -> Keys {
+        let description = Description {
+            product: "p".parse().unwrap(),
+            title: "P".to_owned(),
+            quantity: Quantity::CarbonFlux,
+            synthetic: true,
+            source: "a test".to_owned(),
+            grid: Grid {
+                rows: 4,
+                cols: 8,
+                north_deg: 90.0,
+                west_deg: -180.0,
+                dlat_deg: 45.0,
+                dlon_deg: 45.0,
+            },
+            version: None,
+            statistic: None,
+        };
+        let created = Repository::create(store, "cubes/p", &description).await;
+        let repository = created.unwrap();
+        let mut edit = Edit::begin(&repository).await.unwrap();
+        let values: Arc<[f32]> = vec![1.0; description.grid.cell_count()].into();
+        let month = Period::month(2000, 1).unwrap();
+        edit.put(month, values).await.unwrap();
+        edit.commit("a month").await.unwrap();
+        repository.keys(&At::Newest).await.unwrap()
+    }
+
+    /// One reads at a time and two wait; a client has room for 200 bytes.
+    fn narrow(store: Store) -> Cubes {
+        let held_bytes = IntGauge::new("held_bytes", "Bytes that are held.").unwrap();
+        Cubes {
+            store,
+            open: Cache::new(HELD_OPEN),
+            reads: Gate::new(1, 2),
+            held: Rooms::new(400, held_bytes),
+        }
+    }
+
+    #[tokio::test]
+    async fn who_waits_for_room_lets_others_read_and_is_answered_when_there_is_some() {
+        let store = Store::memory();
+        let keys = keys(&store).await;
+        let cubes = narrow(store);
+        let full = cubes.held.enter(Client::asking(), 200).unwrap();
+        let Pass {
+            place: _place,
+            turn,
+        } = cubes.reads.enter().await.unwrap();
+        let before = cubes.reads.enter().now_or_never();
+        assert!(before.is_none(), "there is another turn: it tests nothing");
+        let mut waiting = Box::pin(cubes.get(&keys, KEY, (None, 100), turn));
+        assert!(waiting.as_mut().now_or_never().is_none());
+        let next = cubes.reads.enter().now_or_never();
+        assert!(next.is_some_and(|next| next.is_ok()), "the turn is held");
+        drop(full);
+        let content = waiting.await.unwrap().unwrap();
+        assert_eq!(keys.get(KEY, None).await.unwrap().as_ref(), Some(&content));
+        assert_eq!(cubes.held.held_bytes(), 100);
+        drop(content);
+        assert_eq!(cubes.held.held_bytes(), 0);
+    }
+
+    #[tokio::test]
+    async fn who_leaves_while_he_waits_for_room_takes_neither_turn_nor_room() {
+        let store = Store::memory();
+        let keys = keys(&store).await;
+        let cubes = narrow(store);
+        let full = cubes.held.enter(Client::asking(), 200).unwrap();
+        let Pass { place, turn } = cubes.reads.enter().await.unwrap();
+        let mut leaving = Box::pin(cubes.get(&keys, KEY, (None, 100), turn));
+        assert!(leaving.as_mut().now_or_never().is_none());
+        drop((leaving, place));
+        assert_eq!(cubes.held.held_bytes(), 200);
+        drop(full);
+        assert_eq!(cubes.held.held_bytes(), 0);
+        let next = cubes.reads.enter().now_or_never();
+        let Pass {
+            place: _place,
+            turn,
+        } = next.expect("the turn is free").unwrap();
+        // All of a client's room is there for the next one.
+        let content = cubes.get(&keys, KEY, (None, 200), turn).await.unwrap();
+        assert!(content.is_some());
+        assert_eq!(cubes.held.held_bytes(), 200);
+    }
+}
