@@ -301,6 +301,8 @@ mod tests {
 
     use super::*;
     use crate::group::write_group;
+    use crate::plan::Plan;
+    use crate::state::State;
     use crate::{At, Edit, Repository};
 
     const GRID: Grid = Grid {
@@ -383,9 +385,8 @@ mod tests {
         );
     }
 
-    /// As cubes of such statistics were written before they were told from sums.
-    #[tokio::test]
-    async fn a_statistic_that_was_written_as_a_sum_is_read_and_its_next_step_makes_it_right() {
+    /// A statistic of the first three months, as cubes of such were written before they were told from sums.
+    async fn written_as_a_sum() -> Repository {
         let own = |statistic| description(Quantity::AccumulatedCarbon, statistic);
         let place = Store::memory();
         let repository = cube_of(&place, &own(None), 3).await;
@@ -396,22 +397,48 @@ mod tests {
         let mut session = session.write().await;
         session.commit("as before").execute().await.unwrap();
         drop(session);
-        let repository = Repository::open(&place, "p").await.unwrap();
-        let months = |cube: &crate::Cube| -> Vec<Period> {
-            cube.steps().iter().map(|step| step.period).collect()
-        };
-        let month = |month| Period::month(1970, month).unwrap();
+        Repository::open(&place, "p").await.unwrap()
+    }
+
+    /// Has a cube the first months, each of its own time, and no starts of steps beside their bounds?
+    async fn is_of_months(repository: &Repository, months: std::ops::RangeInclusive<u32>) {
+        let (middles, bounds) = of_months(months.clone());
+        assert_eq!(instants(repository, |axis| &axis.time).await, middles);
+        assert_eq!(instants(repository, |axis| &axis.bounds).await, bounds);
         let cube = repository.at(&At::Newest).await.unwrap();
-        assert_eq!(months(&cube), [1, 2, 3].map(month));
-        put(&repository, 4..=4).await;
-        let (middles, bounds) = of_months(1..=4);
-        assert_eq!(instants(&repository, |axis| &axis.time).await, middles);
-        assert_eq!(instants(&repository, |axis| &axis.bounds).await, bounds);
-        let cube = repository.at(&At::Newest).await.unwrap();
-        assert_eq!(months(&cube), [1, 2, 3, 4].map(month));
+        let found: Vec<Period> = cube.steps().iter().map(|step| step.period).collect();
+        let months = months.map(|month| Period::month(1970, month).unwrap());
+        assert_eq!(found, months.collect::<Vec<_>>());
         let session = cube.session();
         let path = Path::new("/step_start").unwrap();
         assert!(session.read().await.get_node(&path).await.is_err());
+    }
+
+    #[tokio::test]
+    async fn a_statistic_that_was_written_as_a_sum_is_read_and_its_next_step_makes_it_right() {
+        let repository = written_as_a_sum().await;
+        let cube = repository.at(&At::Newest).await.unwrap();
+        let found: Vec<Period> = cube.steps().iter().map(|step| step.period).collect();
+        let month = |month| Period::month(1970, month).unwrap();
+        assert_eq!(found, [1, 2, 3].map(month));
+        put(&repository, 4..=4).await;
+        is_of_months(&repository, 1..=4).await;
+    }
+
+    /// As of a version that has the same steps: times are written from the first one on, and not from the first that is another.
+    #[tokio::test]
+    async fn a_statistic_that_was_written_as_a_sum_is_made_right_where_no_step_is_another() {
+        let repository = written_as_a_sum().await;
+        let written = [1, 2, 3].map(|month| Period::month(1970, month).unwrap().end.ms());
+        let before = instants(&repository, |axis| &axis.time).await;
+        assert_eq!(before, written, "it is no sum: this test tests nothing");
+        let edit = Edit::begin(&repository).await.unwrap();
+        let state = State::newest(&repository).await.unwrap();
+        let plan = Plan::exactly(&state.steps, &state.steps, edit.staged()).unwrap();
+        assert_eq!(plan.first_change(&state.steps), None);
+        let laid = edit.lay(&state, &plan, "another version").await.unwrap();
+        assert!(laid.is_some());
+        is_of_months(&repository, 1..=3).await;
     }
 
     #[tokio::test]
