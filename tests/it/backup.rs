@@ -4,8 +4,51 @@ use std::path::Path;
 
 use harness::{granule, program};
 
-/// What names other objects, in the order in which it is copied.
-const FIRST: [&str; 3] = ["manifests", "observation-indexes", "manifest-pages"];
+const PAGE: &str = include_str!("../../docs/operations.md");
+
+/// Folders that are copied at a time.
+enum Part {
+    Named(Vec<&'static str>),
+    /// All that no other part names.
+    Else,
+}
+
+/// In which order the page says that a store is copied, each part whole before the next.
+fn parts() -> Vec<Part> {
+    let (_, section) = PAGE.split_once("\n## Backup\n").unwrap();
+    let (_, order) = section.split_once("in this order:").unwrap();
+    let (order, _) = order.split_once(", each whole before the next").unwrap();
+    let part = |text: &'static str| {
+        let quoted = text.split('`').skip(1).step_by(2);
+        let names: Vec<&str> = quoted.map(|name| name.strip_suffix('/').unwrap()).collect();
+        let is_else = text.contains("all else");
+        assert_ne!(is_else, !names.is_empty(), "what is copied here? {text}");
+        if is_else {
+            Part::Else
+        } else {
+            Part::Named(names)
+        }
+    };
+    order.split(", then").map(part).collect()
+}
+
+/// Copies some parts of a store, one after the other.
+fn copy_parts<'a>(data: &Path, to: &Path, all: &[Part], some: impl Iterator<Item = &'a Part>) {
+    let is_named = |name: &str| {
+        let mut named = all.iter();
+        named.any(|part| matches!(part, Part::Named(names) if names.contains(&name)))
+    };
+    for part in some {
+        match part {
+            Part::Named(names) => {
+                for name in names {
+                    copy_where(data, to, |it| it == *name);
+                }
+            }
+            Part::Else => copy_where(data, to, |it| !is_named(it)),
+        }
+    }
+}
 
 fn land(data: &Path, month: usize) {
     let file = granule::write(data, month, 0).unwrap();
@@ -43,29 +86,41 @@ fn copy_where(data: &Path, to: &Path, is_wanted: impl Fn(&str) -> bool) {
 }
 
 #[test]
-fn a_store_that_is_copied_while_a_file_lands_is_whole_if_manifests_were_copied_first() {
-    let (data, right, wrong) = (
-        tempfile::tempdir().unwrap(),
-        tempfile::tempdir().unwrap(),
-        tempfile::tempdir().unwrap(),
-    );
-    let (data, right, wrong) = (data.path(), right.path(), wrong.path());
+fn a_store_that_is_copied_in_the_order_of_the_page_while_a_file_lands_is_whole() {
+    let parts = parts();
+    let place = |name: &str| {
+        let is_it = |part: &Part| matches!(part, Part::Named(names) if names.contains(&name));
+        parts.iter().position(is_it).expect("the page names it")
+    };
+    // Of two steps there are no pages of a manifest, and of a flux no index of observations.
+    assert!(place("manifests") < place("manifest-pages"));
+    let last = parts.len() - 1;
+    assert!(place("observation-indexes") < last && matches!(parts[last], Part::Else));
+    let folder = || tempfile::tempdir().unwrap();
+    let (data, wrong) = (folder(), folder());
+    let (data, wrong) = (data.path(), wrong.path());
+    // A file lands after the first part is copied, after the second, and so on.
+    let right: Vec<(usize, tempfile::TempDir)> =
+        (1..parts.len()).map(|at| (at, folder())).collect();
     land(data, 0);
-    for name in FIRST {
-        copy_where(data, right, |it| it == name);
+    for (at, right) in &right {
+        copy_parts(data, right.path(), &parts, parts[..*at].iter());
     }
-    copy_where(data, wrong, |it| !FIRST.contains(&it));
+    let backwards = || parts.iter().rev();
+    copy_parts(data, wrong, &parts, backwards().take(1));
     land(data, 1);
-    copy_where(data, right, |it| !FIRST.contains(&it));
-    for name in FIRST.iter().rev() {
-        copy_where(data, wrong, |it| it == *name);
+    for (at, right) in &right {
+        copy_parts(data, right.path(), &parts, parts[*at..].iter());
     }
-    program::succeed(right, &["verify"]).unwrap();
+    copy_parts(data, wrong, &parts, backwards().skip(1));
+    for (_, right) in &right {
+        program::succeed(right.path(), &["verify"]).unwrap();
+        let products = program::json(right.path(), &["products", "--json"]).unwrap();
+        let mut products = products.as_array().unwrap().iter();
+        let flux = products.find(|it| it["product"] == "flux").unwrap();
+        assert_eq!(flux["step_count"], 1, "the version that was there at first");
+    }
     let lacks = program::run(wrong, &["verify"]).unwrap();
     let lacks = String::from_utf8(lacks.stdout).unwrap();
     assert!(lacks.contains("is missing"), "it tests nothing: {lacks}");
-    let products = program::json(right, &["products", "--json"]).unwrap();
-    let mut products = products.as_array().unwrap().iter();
-    let flux = products.find(|it| it["product"] == "flux").unwrap();
-    assert_eq!(flux["step_count"], 1, "the version that was there at first");
 }
