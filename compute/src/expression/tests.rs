@@ -36,6 +36,7 @@ fn close(found: &[f64], expected: &[f64]) {
         (found - expected).abs() < 1e-12 * expected.abs().max(1.0)
             || found.is_nan() && expected.is_nan()
     };
+    assert_eq!(found.len(), expected.len(), "{found:?}");
     assert!(found.iter().zip(expected).all(is_close), "{found:?}");
 }
 
@@ -133,6 +134,7 @@ fn no_comparison_with_what_is_no_number_is_true() {
         let chosen = evaluate(&format!("CASE WHEN {truth} THEN 1 ELSE 2 END"));
         let expected = [2.0, 1.0, f64::NAN, 2.0];
         let is_same = |(found, expected): (&f64, &f64)| found.total_cmp(expected).is_eq();
+        assert_eq!(chosen.values.len(), expected.len(), "{truth}");
         let mut all = chosen.values.iter().zip(&expected);
         assert!(all.all(is_same), "{truth}: {:?}", chosen.values);
         assert_eq!(chosen.not_finite, 0);

@@ -56,6 +56,8 @@ async fn what_is_derived_is_a_cube_too_and_one_that_is_behind_is_brought_up() {
             field(&store, &derived, 11).await,
         );
         let same = |(a, b): (&f32, &f32)| a.to_bits() == b.to_bits() || (a.is_nan() && b.is_nan());
+        let cells = ONE_DEGREE.cell_count();
+        assert_eq!((there.len(), here.len()), (cells, cells));
         assert!(there.iter().zip(&here).all(same));
     }
 }

@@ -67,6 +67,10 @@ async fn read(store: &Store, manifest: &Manifest, step: usize) -> Vec<f32> {
         .unwrap()
 }
 
+fn bits(values: &[f32]) -> impl Iterator<Item = u32> {
+    values.iter().map(|value| value.to_bits())
+}
+
 fn at(row: usize, col: usize) -> usize {
     row * 37 + col
 }
@@ -116,7 +120,7 @@ async fn a_climatology_is_a_product_of_twelve_months() {
                 read(&store, &made, month).await,
                 read(&store, &again, month).await,
             );
-            assert!(a.iter().zip(&b).all(|(a, b)| a.to_bits() == b.to_bits()));
+            assert!(bits(&a).eq(bits(&b)));
         }
         assert_eq!(derived(&engine, &options).await.unwrap(), made);
     }
@@ -594,7 +598,7 @@ async fn memory_changes_no_bit_and_what_it_cannot_hold_is_refused() {
             read(&store, &roomy, month).await,
             read(&store, &small, month).await,
         );
-        assert!(a.iter().zip(&b).all(|(a, b)| a.to_bits() == b.to_bits()));
+        assert!(bits(&a).eq(bits(&b)));
     }
     let tiny = engine.clone().with_memory_bytes(64 << 10);
     let refused = derived(&tiny, &of("tiny")).await.unwrap_err();
@@ -624,7 +628,7 @@ async fn anomalies_have_the_same_bits_from_blocks_and_from_fields() {
                 read(&store, &made, step).await,
                 read(&store, &other, step).await,
             );
-            assert!(a.iter().zip(&b).all(|(a, b)| a.to_bits() == b.to_bits()));
+            assert!(bits(&a).eq(bits(&b)));
             // By hand: -1, 0, 1 of the years.
             let year = (14 + step) / 12;
             let inside = a[at(7, 15)];
@@ -651,7 +655,9 @@ async fn statistics_of_different_periods_share_nothing_but_the_reading() {
         of(MapStatistic::Phase, "2001-09", "c"),
     ];
     let made = derive_statistics(&engine, &product("wind"), &both, &|_| ()).await;
-    for (made, (options, name)) in made.unwrap().iter().zip(both.iter().zip(["x", "y", "z"])) {
+    let made = made.unwrap();
+    assert_eq!(made.len(), both.len());
+    for (made, (options, name)) in made.iter().zip(both.iter().zip(["x", "y", "z"])) {
         let alone = MapOptions {
             name: Some(product(name)),
             ..options.clone()
@@ -659,12 +665,7 @@ async fn statistics_of_different_periods_share_nothing_but_the_reading() {
         let alone = derived(&engine, &alone).await.unwrap();
         assert_eq!(made.steps[0].period, alone.steps[0].period);
         let (own, right) = (read(&store, made, 0).await, read(&store, &alone, 0).await);
-        assert!(
-            own.iter()
-                .zip(&right)
-                .all(|(a, b)| a.to_bits() == b.to_bits()),
-            "{name}"
-        );
+        assert!(bits(&own).eq(bits(&right)), "{name}");
     }
 }
 
