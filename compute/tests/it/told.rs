@@ -16,8 +16,8 @@ use contract::quantity::Quantity;
 use contract::topic::Topic;
 use prometheus::Registry;
 use service::Stop;
-use storage::Store;
 use storage::log::{EmbeddedLog, EventLog, contents};
+use storage::{Store, manifests};
 
 use crate::fixture::{folder_store, land, product, wavy_year};
 
@@ -93,7 +93,13 @@ async fn each_landed_granule_is_followed_by_one_event_and_a_batch_by_one_derivat
     assert_eq!((manifest.number, derived_from.number), (1, 3));
     assert!(told.iter().all(|(_, body)| *body == told[0].1));
 
-    // Nothing new: nothing is told again.
+    // Who comes after and reads something that nothing follows from tells nothing again.
+    let newest = manifests::latest(&store, &product("wavy")).await;
+    let unknown = Manifest {
+        product: product("nobody"),
+        ..newest.unwrap().unwrap()
+    };
+    log.append(&[landed("unknown", &unknown)]).await.unwrap();
     derive_until_idle(&store, &log).await;
     assert_eq!(derived(&*log).await.len(), 3);
 }
