@@ -144,7 +144,7 @@ async fn a_database_away_for_a_while_loses_nothing() {
             switch.cut();
         }
         if minute == 50 {
-            tokio::time::sleep(Duration::from_secs(2)).await;
+            switch.refuses(2).await;
             assert!(
                 log.lag(Topic::Observation, GROUP).await.unwrap() > 0,
                 "the cut did not happen"
@@ -180,7 +180,8 @@ async fn a_stop_while_the_database_is_away_hands_the_messages_back() {
         .await
         .unwrap();
     let running = Running::start(&log, Arc::clone(&store));
-    tokio::time::sleep(Duration::from_millis(300)).await;
+    // It has the message, and nowhere to put it.
+    switch.refuses(1).await;
     running.stop().await;
     assert_eq!(log.lag(Topic::Observation, GROUP).await.unwrap(), 1);
     switch.mend();
