@@ -113,8 +113,10 @@ async fn named_regions_are_stored_once_for_everybody() {
     let (_folder, store) = landed().await;
     let engine = Engine::local(store.clone()).storing_no_weights();
     let query = total(&product("wavy"), "14n-50n");
+    let before = objects(&store).await;
     budget(&engine, &query).await.unwrap();
     let once = objects(&store).await;
+    assert_eq!(once, before + 2, "weights of all of it and of its sea");
     budget(&engine, &query).await.unwrap();
     let sphere = BudgetQuery {
         earth: Earth::Sphere,
