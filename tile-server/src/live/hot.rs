@@ -164,5 +164,9 @@ mod tests {
             hot.asked(&product(), Mode::Map, &view(x), Some(time("2000")));
         }
         assert!(hot.lock().len() <= MOST_TILES);
+        // What was asked for last is among what is remembered, and half of the room is in use.
+        let found = hot.of(&product(), 20_000, |_| true);
+        assert!(found.iter().any(|tile| tile.view == view(19_999)));
+        assert!(found.len() >= MOST_TILES / 2, "{}", found.len());
     }
 }
