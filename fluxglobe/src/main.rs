@@ -86,9 +86,8 @@ fn is_of_the_end(panic: &(dyn Any + Send)) -> bool {
     text.is_some_and(|text| text.contains("it is being shutdown"))
 }
 
-#[expect(clippy::print_stderr, reason = "the last word of a failed command")]
 fn failed(error: &anyhow::Error) -> ExitCode {
-    eprintln!("fluxglobe: {}", told(error));
+    progress::say(&format!("fluxglobe: {}", told(error)));
     ExitCode::FAILURE
 }
 
