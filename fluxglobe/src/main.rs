@@ -7,6 +7,7 @@ mod command;
 mod demo;
 mod deployment;
 mod desktop;
+mod figures;
 mod file_handles;
 mod heights;
 mod instants;

@@ -10,6 +10,7 @@ use observations::ObservationStore;
 
 use crate::cli::{MatchTime, Matchup, Observations, ObservationsAsked, Settings};
 use crate::command::budget;
+use crate::figures::figures;
 use crate::instants::Instants;
 use crate::{deployment, plot, progress};
 
@@ -308,7 +309,7 @@ async fn matchup(settings: &Settings, options: &Matchup) -> Result<()> {
 /// How a product and observations differ, one row in the unit that people read.
 fn compared(matched: &matchup::Matchup) -> Table {
     let s = &matched.statistics;
-    let number = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |v| format!("{v:.4}"));
+    let number = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |v| figures(v, 4));
     let with_unit = |name: &str| match matched.unit.as_str() {
         "" => name.to_owned(),
         unit => format!("{name}, {unit}"),
