@@ -90,7 +90,8 @@ impl BandSum {
 }
 
 impl Bands {
-    /// The bands of `band_deg` degrees, on multiples of it and no further than the poles, that cells with their middles between west, south, east and north lie in.
+    /// The bands of `band_deg` degrees, on multiples of it and no further than the poles, that cells with their middles between west, south,
+    /// east and north lie in.
     pub fn of(
         grid: &Grid,
         along: Along,
