@@ -200,7 +200,7 @@ fn one_property(manifest: &Manifest, observations: &[Observation]) -> Result<Str
         let reason = format!(
             "{} holds {} in {unit}, {} is in {}",
             manifest.product,
-            manifest.quantity.title().to_lowercase(),
+            manifest.quantity.title(),
             other.property,
             other.unit
         );

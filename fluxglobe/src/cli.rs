@@ -202,7 +202,8 @@ pub(crate) enum Command {
     /// Observations of buoys, ships, stations and profiles.
     #[command(subcommand)]
     Observations(Observations),
-    /// Make anew what was derived from a product, where it is stale or missing.
+    /// Make anew what was derived from a product, where it is stale or missing. Statistics and computed products of it are named, and made by
+    /// `derive`.
     Recompute(Recompute),
     /// Read every stored object and compare it with its name or seal; the exit code is 1 if one is damaged or missing.
     Verify(Verify),

@@ -7,6 +7,7 @@ mod command;
 mod demo;
 mod deployment;
 mod desktop;
+mod figures;
 mod file_handles;
 mod heights;
 mod instants;
@@ -86,9 +87,8 @@ fn is_of_the_end(panic: &(dyn Any + Send)) -> bool {
     text.is_some_and(|text| text.contains("it is being shutdown"))
 }
 
-#[expect(clippy::print_stderr, reason = "the last word of a failed command")]
 fn failed(error: &anyhow::Error) -> ExitCode {
-    eprintln!("fluxglobe: {}", told(error));
+    progress::say(&format!("fluxglobe: {}", told(error)));
     ExitCode::FAILURE
 }
 

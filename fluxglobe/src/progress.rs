@@ -1,6 +1,6 @@
 //! Progress bars on standard error: a name and a count of steps in, a bar or (without a terminal) a line out.
 
-use std::io::{ErrorKind, Write as _};
+use std::io::{ErrorKind, Write};
 use std::path::Path;
 use std::time::Duration;
 
@@ -57,10 +57,14 @@ impl ingest::Progress for LandingBar {
     }
 }
 
-/// A line of talk.
-#[expect(clippy::print_stderr, reason = "talk goes to standard error")]
+/// A line of talk on standard error. Where nobody takes it (`2>&1 | head`, a log on a full disk), the work goes on and its result counts:
+/// the macro of the standard library would panic.
 pub(crate) fn say(line: &str) {
-    eprintln!("{line}");
+    say_to(&mut std::io::stderr(), line);
+}
+
+fn say_to(out: &mut dyn Write, line: &str) {
+    _ = writeln!(out, "{line}");
 }
 
 /// A result. A reader that went away (`| head`) is no failure.

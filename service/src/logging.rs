@@ -26,7 +26,10 @@ pub fn start_logging(filter: &str, format: LogFormat) -> Result<(), ServiceError
         filter: filter.to_owned(),
         reason: e.to_string(),
     })?;
+    // A line that cannot be written (a log on a full disk, a reader that went away) is lost, and no panic of whoever said it: the library
+    // would tell of it by `eprintln!`, on the same standard error.
     let mut lines = tracing_subscriber::fmt()
+        .log_internal_errors(false)
         .with_env_filter(parsed)
         .with_writer(stderr);
     // Files and journals are searched as they are: colours are for a terminal alone, unless NO_COLOR forbids them.

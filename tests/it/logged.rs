@@ -16,6 +16,45 @@ fn log_lines_have_no_colours_where_there_is_no_terminal() {
     assert!(!talk.contains('\u{1b}'), "{talk:?}");
 }
 
+/// As a log on a full disk refuses them, or a reader that went away.
+#[test]
+fn lines_that_nobody_takes_are_lost_and_the_work_goes_on() {
+    let place = tempfile::tempdir().unwrap();
+    let data = place.path().join("data");
+    let ended = |words: &[&str]| {
+        let full = std::fs::File::options().write(true).open("/dev/full");
+        let mut command = program::command(&data);
+        let output = command.args(words).stderr(full.unwrap()).output().unwrap();
+        (
+            output.status.code(),
+            String::from_utf8(output.stdout).unwrap(),
+        )
+    };
+    let file = place.path().join("sea.h5");
+    let file = file.to_str().unwrap();
+    let (code, made) = ended(&["generate", "china-sea", "--scale", "0.02", "-o", file]);
+    assert_eq!((code, made.trim()), (Some(0), file));
+    let (code, landed) = ended(&["ingest", file]);
+    assert!(
+        landed.contains("landed in china-sea-synthetic@1-"),
+        "{landed}"
+    );
+    assert_eq!(code, Some(0));
+    // Refusals and log lines of services: an exit code that a panic does not have.
+    assert_eq!(ended(&["budget", "--product", "nothing"]).0, Some(1));
+    let store = format!("file:{file}");
+    let service = [
+        "executor",
+        "--admin",
+        "127.0.0.1:0",
+        "--log",
+        "info",
+        "--store",
+        &store,
+    ];
+    assert_eq!(ended(&service).0, Some(1));
+}
+
 /// The loader of drivers says that it was opened, when told to.
 #[test]
 fn with_the_processor_alone_no_driver_is_looked_for() {

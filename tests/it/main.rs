@@ -7,6 +7,7 @@ mod attached_bucket;
 mod backup;
 mod bad_clients;
 mod bad_input;
+mod behind;
 mod bench_serve;
 mod browser;
 mod circles;

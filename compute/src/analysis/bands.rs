@@ -90,7 +90,8 @@ impl BandSum {
 }
 
 impl Bands {
-    /// The bands of `band_deg` degrees, on multiples of it, that cells with their middles between west, south, east and north lie in.
+    /// The bands of `band_deg` degrees, on multiples of it and no further than the poles, that cells with their middles between west, south,
+    /// east and north lie in.
     pub fn of(
         grid: &Grid,
         along: Along,
@@ -148,7 +149,14 @@ impl Bands {
         } else {
             0
         };
-        let edge = |band: usize| (low + band as f64) * band_deg;
+        let edge = |band: usize| {
+            let edge = (low + band as f64) * band_deg;
+            match along {
+                // Where 90 is no multiple of a band, the outermost ones end at the poles.
+                Along::Lat => edge.clamp(-90.0, 90.0),
+                Along::Lon => edge,
+            }
+        };
         Self {
             along,
             rows,
@@ -406,6 +414,26 @@ mod tests {
             let bits = |areas: &[f64]| areas.iter().map(|area| area.to_bits()).collect::<Vec<_>>();
             assert_eq!(bits(&found), bits(&expected), "{along:?}");
         }
+    }
+
+    #[test]
+    fn bands_of_latitude_end_at_the_poles() {
+        let globe = Grid {
+            rows: 36,
+            cols: 72,
+            north_deg: 90.0,
+            west_deg: -180.0,
+            dlat_deg: 5.0,
+            dlon_deg: 5.0,
+        };
+        let whole = [-180.0, -90.0, 180.0, 90.0];
+        let edges = |band_deg: f64| {
+            let bands = Bands::of(&globe, Along::Lat, band_deg, whole, Earth::Wgs84);
+            let edges = bands.edges_deg();
+            [edges[0], edges[1], edges[edges.len() - 1]]
+        };
+        assert_eq!(edges(20.0), [(-90.0, -80.0), (-80.0, -60.0), (80.0, 90.0)]);
+        assert_eq!(edges(30.0), [(-90.0, -60.0), (-60.0, -30.0), (60.0, 90.0)]);
     }
 
     #[test]

@@ -23,7 +23,7 @@ pub(crate) enum Observations {
 /// Which observations.
 #[derive(Debug, Args)]
 pub(crate) struct ObservationsAsked {
-    /// `global`, a named region, a box WEST,SOUTH,EAST,NORTH, or a GeoJSON file.
+    /// `global`, a named region, a box WEST,SOUTH,EAST,NORTH, a GeoJSON or WKT file, or the text of one.
     #[arg(long, default_value = "global", allow_hyphen_values = true)]
     pub(crate) region: String,
     /// First instant.

@@ -145,7 +145,7 @@ pub(crate) struct Gc {
     /// Newest versions of each product that stay readable.
     #[arg(long, default_value = "10")]
     pub(crate) keep_versions: NonZeroU16,
-    /// Whatever was written in the last days stays.
+    /// Whatever was written in the last days stays, and of the last hour in any case.
     #[arg(long, default_value = "30", value_name = "DAYS")]
     pub(crate) keep_days: u16,
     /// List and remove nothing.

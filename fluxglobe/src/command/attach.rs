@@ -5,6 +5,7 @@ use contract::masked::MaskedCells;
 use ingest::attach::{Attached, Request};
 use serde::Serialize;
 
+use super::behind::say_what_is_behind;
 use crate::cli::{Attach, Settings};
 use crate::{deployment, progress};
 
@@ -70,6 +71,8 @@ pub(crate) async fn run(settings: &Settings, options: &Attach) -> Result<()> {
     if !attached.masked.is_none() {
         progress::say(&attached.masked.to_string());
     }
+    let changed = attached.is_new.then_some(&attached.version.product);
+    say_what_is_behind(&store, changed).await?;
     if options.json {
         let text = serde_json::to_string_pretty(&Line::of(&attached))?;
         return progress::result(&text);

@@ -16,6 +16,7 @@ use kafka_log::KafkaSettings;
 use storage::Store;
 use storage::log::EventLog;
 
+use super::behind::say_what_is_behind;
 use super::budget::stored_region;
 use crate::cli::{
     Derive, DeriveCo2Flux, DeriveStatistic, DeriveWhat, Expression, Regrid, Settings,
@@ -40,7 +41,7 @@ pub(crate) async fn run(settings: &Settings, options: Derive) -> Result<()> {
             let log = log.as_deref();
             let manifest = accumulated(settings, store.clone(), log, &product, start).await?;
             progress::result(&manifest.id().to_string())?;
-            say_what_is_behind(&store, &[manifest]).await
+            say_what_is_behind(&store, [&manifest.product]).await
         }
     }
 }
@@ -166,7 +167,7 @@ async fn computed(settings: &Settings, kafka: &KafkaSettings, request: &Request)
         ));
     }
     progress::result(&manifest.id().to_string())?;
-    say_what_is_behind(engine.store(), std::slice::from_ref(manifest)).await
+    say_what_is_behind(engine.store(), [&manifest.product]).await
 }
 
 fn functions() -> Result<()> {
@@ -218,21 +219,7 @@ async fn statistic(settings: &Settings, options: &DeriveStatistic) -> Result<()>
         }
         progress::result(&manifest.id().to_string())?;
     }
-    say_what_is_behind(engine.store(), &made).await
-}
-
-/// Says what is made of products and still of older versions of them: the deriver reads what lands, and nothing of commands.
-async fn say_what_is_behind(store: &Store, made: &[Manifest]) -> Result<()> {
-    let made: Vec<&ProductId> = made.iter().map(|manifest| &manifest.product).collect();
-    let behind = compute::dependents::behind(store, &made).await?;
-    if !behind.is_empty() {
-        let names: Vec<&str> = behind.iter().map(ProductId::as_str).collect();
-        progress::say(&format!(
-            "made of an older version: {}; derive them again, or the deriver of a cluster does when something lands in what they are made from",
-            names.join(", ")
-        ));
-    }
-    Ok(())
+    say_what_is_behind(engine.store(), made.iter().map(|made| &made.product)).await
 }
 
 /// Tells of a derived version, once.

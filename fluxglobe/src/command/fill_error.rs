@@ -13,6 +13,7 @@ use render_proof::fill::hold_out::{HoldOut, Score};
 use serde::Serialize;
 
 use crate::cli::{FillError, Settings};
+use crate::figures::figures;
 use crate::{deployment, progress};
 
 /// Longest side of the picture, pixels.
@@ -184,9 +185,8 @@ fn table(report: &Report) -> String {
         "within 2σ".to_owned(),
         "spread".to_owned(),
     ]);
-    let number = |number: Option<f64>| {
-        number.map_or_else(|| "-".to_owned(), |number| format!("{number:.4}"))
-    };
+    let number =
+        |number: Option<f64>| number.map_or_else(|| "-".to_owned(), |number| figures(number, 4));
     for row in report.steps.iter().chain(&report.all) {
         let step = row
             .step

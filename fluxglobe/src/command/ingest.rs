@@ -11,6 +11,7 @@ use observations::FileStore;
 use serde::Serialize;
 use storage::log::EventLog;
 
+use super::behind::say_what_is_behind;
 use crate::cli::{Ingest, Settings};
 use crate::progress::LandingBar;
 use crate::sink::Sink;
@@ -24,7 +25,7 @@ pub(crate) async fn run(settings: &Settings, options: Ingest) -> Result<ExitCode
         log,
         ingest::Settings::with_current_program()?,
     )
-    .with_observations(Arc::new(Sink(Arc::new(FileStore::new(store)))));
+    .with_observations(Arc::new(Sink(Arc::new(FileStore::new(store.clone())))));
     let files: Vec<_> = options
         .files
         .iter()
@@ -55,6 +56,11 @@ pub(crate) async fn run(settings: &Settings, options: Ingest) -> Result<ExitCode
             progress::result(&outcome.to_string())?;
         }
     }
+    let landed = outcomes.iter().filter_map(|outcome| match outcome {
+        Outcome::Landed { manifest, .. } => Some(&manifest.product),
+        _ => None,
+    });
+    say_what_is_behind(&store, landed).await?;
     // What landed is there and told of; it is only read faster along time for this.
     cube::compacted().await;
     Ok(if refused == 0 {

@@ -3,6 +3,7 @@
 mod adapters;
 mod analysis;
 mod attach;
+mod behind;
 mod budget;
 pub(crate) mod derive;
 mod export;

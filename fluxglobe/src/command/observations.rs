@@ -4,12 +4,16 @@ use anyhow::{Result, bail};
 use comfy_table::presets::NOTHING;
 use comfy_table::{CellAlignment, Table};
 use compute::matchup::{self, Fit, LeftOut, TimeMatch};
+use compute::region::file;
+use contract::manifest::AskedVersion;
 use contract::masked::MaskedCells;
 use contract::observation::{Filter, MAX_LIMIT, Observation, Quality};
+use contract::region::{MaskCode, Region};
 use observations::ObservationStore;
 
 use crate::cli::{MatchTime, Matchup, Observations, ObservationsAsked, Settings};
 use crate::command::budget;
+use crate::figures::figures;
 use crate::instants::Instants;
 use crate::{deployment, plot, progress};
 
@@ -23,7 +27,7 @@ pub(crate) async fn run(settings: &Settings, command: Observations) -> Result<()
 
 fn filter(asked: &ObservationsAsked) -> Result<Filter> {
     Ok(Filter {
-        region: budget::region(&asked.region)?.region,
+        region: region(&asked.region)?,
         from: asked.from,
         to: asked.to,
         properties: asked.property.clone().into_iter().collect(),
@@ -34,6 +38,24 @@ fn filter(asked: &ObservationsAsked) -> Result<Filter> {
         limit: asked.limit.min(MAX_LIMIT),
         ..Filter::default()
     })
+}
+
+/// A region that observations can be asked of.
+///
+/// # Errors
+/// It is none, or the cells of a mask.
+fn region(text: &str) -> Result<Region> {
+    match (budget::region(text), MaskCode::split(text)) {
+        (Ok(asked), _) => Ok(asked.region),
+        (Err(_), Some((mask, _code)))
+            if mask.parse::<AskedVersion>().is_ok() && !file::is_file_name(text) =>
+        {
+            bail!(
+                "region {text}: observations are not asked for by the cells of a mask; give a box, a polygon or the name of a region"
+            )
+        }
+        (Err(error), _) => Err(error),
+    }
 }
 
 async fn list(settings: &Settings, asked: &ObservationsAsked) -> Result<()> {
@@ -62,7 +84,8 @@ async fn list(settings: &Settings, asked: &ObservationsAsked) -> Result<()> {
         return Ok(());
     }
     if platforms.is_empty() {
-        progress::say("no observations; land files of them with `fluxglobe ingest`");
+        let is_empty = store.datasets().await?.is_empty();
+        progress::say(none(is_empty));
         return Ok(());
     }
     let mut table = Table::new();
@@ -145,6 +168,7 @@ async fn query(settings: &Settings, asked: &ObservationsAsked) -> Result<()> {
     let (rows, is_all) = all(store.as_ref(), asked).await?;
     if rows.is_empty() {
         check_dataset(store.as_ref(), asked).await?;
+        progress::say(none(store.datasets().await?.is_empty()));
     }
     let warn = || {
         if !is_all {
@@ -179,6 +203,15 @@ async fn query(settings: &Settings, asked: &ObservationsAsked) -> Result<()> {
     progress::result(&table.to_string())?;
     warn();
     Ok(())
+}
+
+/// What is said where nothing is listed, of a store without any observation or of one that has others.
+fn none(is_empty: bool) -> &'static str {
+    if is_empty {
+        "no observations; land files of them with `fluxglobe ingest`"
+    } else {
+        "no observation is what was asked for; `fluxglobe observations list` without other words tells which there are"
+    }
 }
 
 /// What is said where there are more observations than the limit.
@@ -308,7 +341,7 @@ async fn matchup(settings: &Settings, options: &Matchup) -> Result<()> {
 /// How a product and observations differ, one row in the unit that people read.
 fn compared(matched: &matchup::Matchup) -> Table {
     let s = &matched.statistics;
-    let number = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |v| format!("{v:.4}"));
+    let number = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |v| figures(v, 4));
     let with_unit = |name: &str| match matched.unit.as_str() {
         "" => name.to_owned(),
         unit => format!("{name}, {unit}"),
@@ -364,6 +397,30 @@ mod tests {
         assert!(text.contains("the first 1000 platforms") && text.ends_with("up to 10000"));
         let text = cut_list(MAX_LIMIT);
         assert!(text.contains("the first 10000 platforms") && text.contains("--dataset"));
+    }
+
+    #[test]
+    fn the_cells_of_a_mask_are_refused_as_such() {
+        assert_eq!(region("global").unwrap(), Region::Global);
+        for text in ["basins:5", "basins@2:southern"] {
+            let refused = region(text).unwrap_err().to_string();
+            assert!(
+                refused.contains("not asked for by the cells of a mask"),
+                "{refused}"
+            );
+        }
+        let refused = region("chna-sea").unwrap_err().to_string();
+        assert!(refused.contains("china-sea"), "{refused}");
+    }
+
+    #[test]
+    fn a_question_without_an_answer_is_no_store_without_observations() {
+        assert!(none(true).contains("fluxglobe ingest"));
+        let text = none(false);
+        assert!(
+            text.contains("asked for") && !text.contains("ingest"),
+            "{text}"
+        );
     }
 
     #[test]

@@ -14,6 +14,7 @@ use contract::product::ProductId;
 use serde::Serialize;
 use storage::Store;
 
+use super::behind::say_what_is_behind;
 use crate::cli::{Recompute, RecomputeWhat, Settings};
 use crate::{deployment, progress};
 
@@ -47,7 +48,7 @@ pub(crate) async fn run(settings: &Settings, options: Recompute) -> Result<()> {
     show(&plan, files_plan, &wanted, options.json)?;
     if options.dry_run {
         progress::say("nothing was done: --dry-run");
-        return Ok(());
+        return say_what_is_behind(&store, [&options.product]).await;
     }
     let log = deployment::log(settings, &options.kafka).await?;
     if let Some(files) = &files {
@@ -70,6 +71,9 @@ pub(crate) async fn run(settings: &Settings, options: Recompute) -> Result<()> {
             progress::result(&manifest.id().to_string())?;
         }
     }
+    // Accumulated carbon follows with the fields, and nothing else that is made of either.
+    let accumulated = options.product.accumulated().ok().filter(|_| with_fields);
+    say_what_is_behind(&store, accumulated.iter().chain([&options.product])).await?;
     if with_fields && options.verify {
         cubes(&store, &options.product).await?;
     }

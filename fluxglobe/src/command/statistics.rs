@@ -11,6 +11,7 @@ use export::answer::AnswerFormat;
 use storage::Store;
 
 use crate::cli::{PlotFile, Settings};
+use crate::figures::figures;
 use crate::instants::Instants;
 use crate::{deployment, plot, progress};
 
@@ -130,12 +131,10 @@ fn shown(row: &StatisticsRow, name: &str, found: Instants) -> String {
         };
         return why.to_owned();
     };
-    let number = if value != 0.0 && !(1e-3..1e9).contains(&value.abs()) {
-        format!("{value:.4e}")
-    } else if name == "count" {
+    let number = if name == "count" {
         format!("{value}")
     } else {
-        format!("{value:.4}")
+        figures(value, 4)
     };
     match row.found_at.get(name) {
         Some(time) => format!("{number} ({})", found.text(*time)),

@@ -13,6 +13,7 @@ use contract::series::{PointSeries, RegionSeries};
 use contract::statistics::{PointQuestion, RegionQuestion, StatisticsWishes};
 
 use crate::cli::{Settings, Stats, StatsLine, StatsPoint, StatsPolygon};
+use crate::figures::figures;
 use crate::instants::Instants;
 use crate::{deployment, plot, progress};
 
@@ -221,7 +222,7 @@ fn region_table(answer: &RegionSeries) -> Table {
     }
     let instants = Instants::of(answer.series.iter().flat_map(|step| [step.start, step.end]));
     for step in &answer.series {
-        let mean = step.mean.map(|mean| format!("{mean:.4}"));
+        let mean = step.mean.map(|mean| figures(mean, 4));
         table.add_row([
             instants.text(step.start),
             instants.text(step.end),
@@ -255,7 +256,7 @@ fn table(answer: &PointSeries) -> Table {
     let instants = Instants::of(answer.series.iter().flat_map(|step| [step.start, step.end]));
     for step in &answer.series {
         let (text, bar) = match step.value {
-            Some(value) => (format!("{value:.4}"), bar(value, largest)),
+            Some(value) => (figures(value, 4), bar(value, largest)),
             None => ("no data".to_owned(), String::new()),
         };
         let mut row = vec![

@@ -59,7 +59,7 @@ impl Survey {
             variable: Some(variable),
             meaning: own.as_ref().map(written::meaning),
         };
-        let is_synthetic = own.is_some_and(|own| own.synthetic);
+        let is_synthetic = written::is_synthetic(&foreign.attributes);
         // What is not there is fill value: no data, if the conventions say that of it.
         let own = description.variable(variable);
         let packing = own.map(|own| plan::packing(own, profile)).transpose()?;

@@ -220,8 +220,15 @@ impl Pipeline<'_> {
         Ok(newest.is_some_and(|newest| claim.holds(&newest)))
     }
 
-    /// Refuses a file of a product whose values lie elsewhere.
+    /// Refuses a file of a product whose values lie elsewhere, or are made of others' here.
     async fn check_is_here(&self, newest: &Manifest) -> Result<(), Stop> {
+        if let Some(source) = &newest.derived_from {
+            let detail = format!(
+                "{} is made of {source} by this program; land the file in a product of its own",
+                newest.product
+            );
+            return Err(Rejection::new(RejectReason::Conflict, "product", detail).into());
+        }
         let attached = self.store.attached_to(newest).await;
         let attached = attached.map_err(IngestError::storage("read what it is attached to"))?;
         let Some(attachment) = attached else {

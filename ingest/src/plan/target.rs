@@ -153,7 +153,8 @@ pub(super) fn target(
         profile, product, ..
     } = wish;
     let marked = file.attributes.0.contains_key("synthetic")
-        && file.attributes.number("synthetic") != Some(0.0);
+        && file.attributes.number("synthetic") != Some(0.0)
+        || written::is_file_synthetic(file);
     if let Some(profile) = profile {
         return Ok(Target {
             product: product.unwrap_or(&profile.product).clone(),

@@ -49,6 +49,16 @@ pub(crate) fn note(file: &description::Description, variable: &Variable) -> Opti
     ))
 }
 
+/// Does a cube or an export of this program say of its values, whatever they are, that they are made up?
+pub(crate) fn is_synthetic(attributes: &Map<String, Value>) -> bool {
+    Description::read(attributes, "").is_ok_and(|own| own.synthetic)
+}
+
+/// The same of a file.
+pub(crate) fn is_file_synthetic(file: &description::Description) -> bool {
+    said(file).is_some_and(|attributes| is_synthetic(&attributes))
+}
+
 fn read(attributes: &Map<String, Value>, variable: &str) -> Option<Description> {
     let own = Description::read(attributes, "").ok()?;
     (cube::cf::variable(own.quantity) == variable).then_some(own)
@@ -60,11 +70,15 @@ fn is_of_values(own: &Description) -> bool {
 
 /// What an exported file says of a quantity that is built in.
 fn exported(file: &description::Description, variable: &Variable) -> Option<Description> {
+    let own = read(&said(file)?, &variable.name)?;
+    (!matches!(own.quantity, Quantity::Open(_))).then_some(own)
+}
+
+/// The attribute of an exported file that holds it, as a cube has it.
+fn said(file: &description::Description) -> Option<Map<String, Value>> {
     let text = file.attributes.text(Description::ATTRIBUTE)?;
     let said: Value = serde_json::from_str(text).ok()?;
-    let attributes = Map::from_iter([(Description::ATTRIBUTE.to_owned(), said)]);
-    let own = read(&attributes, &variable.name)?;
-    (!matches!(own.quantity, Quantity::Open(_))).then_some(own)
+    Some(Map::from_iter([(Description::ATTRIBUTE.to_owned(), said)]))
 }
 
 #[cfg(test)]
@@ -78,23 +92,7 @@ mod tests {
         statistic: Option<MapStatistic>,
         positive: &str,
     ) -> (description::Description, Variable) {
-        let own = Description {
-            product: "p".parse().unwrap(),
-            title: "P".to_owned(),
-            quantity: Quantity::CarbonFlux,
-            synthetic: false,
-            source: "S".to_owned(),
-            grid: Grid {
-                rows: 2,
-                cols: 3,
-                north_deg: 1.0,
-                west_deg: 0.0,
-                dlat_deg: 1.0,
-                dlon_deg: 1.0,
-            },
-            version: None,
-            statistic,
-        };
+        let own = of_flux(statistic);
         let text = |name: &str, text: String| (name.to_owned(), AttributeValue::Text(text));
         let said = own.attributes()[Description::ATTRIBUTE].to_string();
         let variable = Variable {
@@ -111,6 +109,48 @@ mod tests {
             ..description::Description::default()
         };
         (file, variable)
+    }
+
+    fn of_flux(statistic: Option<MapStatistic>) -> Description {
+        Description {
+            product: "p".parse().unwrap(),
+            title: "P".to_owned(),
+            quantity: Quantity::CarbonFlux,
+            synthetic: false,
+            source: "S".to_owned(),
+            grid: Grid {
+                rows: 2,
+                cols: 3,
+                north_deg: 1.0,
+                west_deg: 0.0,
+                dlat_deg: 1.0,
+                dlon_deg: 1.0,
+            },
+            version: None,
+            statistic,
+        }
+    }
+
+    #[test]
+    fn what_is_made_up_says_so_whatever_is_made_of_it() {
+        for statistic in [None, Some(MapStatistic::Max)] {
+            for synthetic in [false, true] {
+                let own = Description {
+                    synthetic,
+                    ..of_flux(statistic)
+                };
+                let attributes = own.attributes();
+                assert_eq!(is_synthetic(&attributes), synthetic);
+                let text = AttributeValue::Text(attributes[Description::ATTRIBUTE].to_string());
+                let name = Description::ATTRIBUTE.to_owned();
+                let file = description::Description {
+                    attributes: [(name, text)].into_iter().collect(),
+                    ..description::Description::default()
+                };
+                assert_eq!(is_file_synthetic(&file), synthetic);
+            }
+        }
+        assert!(!is_file_synthetic(&description::Description::default()));
     }
 
     #[test]

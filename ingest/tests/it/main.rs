@@ -14,6 +14,7 @@ mod bands;
 mod calendars;
 mod cf_files;
 mod cleaned;
+mod computed;
 mod contained;
 mod cubes;
 mod damaged;

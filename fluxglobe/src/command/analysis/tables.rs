@@ -7,6 +7,7 @@ use contract::analysis::{
     Season, SeriesAnalysis, SeriesPlace, Trend,
 };
 
+use crate::figures::figures;
 use crate::instants::Instants;
 
 /// Numbers of a row of bands that are shown on one line.
@@ -71,7 +72,7 @@ fn of_unit(text: String, between: &str, unit: &str) -> String {
 }
 
 fn number(value: Option<f64>) -> String {
-    value.map_or_else(|| "-".to_owned(), |value| format!("{value:.4}"))
+    value.map_or_else(|| "-".to_owned(), |value| figures(value, 4))
 }
 
 /// A chance: small ones by their size.
@@ -119,7 +120,7 @@ fn anomaly(made: &Anomalies, unit: &str) -> String {
 fn trend(made: &Trend, unit: &str) -> String {
     let (squares, pairs, test) = (&made.least_squares, &made.theil_sen, &made.mann_kendall);
     let interval = |low: Option<f64>, high: Option<f64>| match low.zip(high) {
-        Some((low, high)) => format!("{low:.4} to {high:.4}"),
+        Some((low, high)) => format!("{} to {}", figures(low, 4), figures(high, 4)),
         None => "-".to_owned(),
     };
     let rows = [
@@ -160,7 +161,7 @@ fn trend(made: &Trend, unit: &str) -> String {
         made.count,
         made.step,
         made.years,
-        of_unit(format!("{:.4}", made.mean), " ", unit)
+        of_unit(figures(made.mean, 4), " ", unit)
     );
     format!("{}\n {told}", table(&header, 1, rows.into_iter()))
 }
@@ -179,11 +180,11 @@ fn season(made: &Season, unit: &str) -> String {
         wave("half-year", &made.semi_annual),
     ];
     let told = format!(
-        "mean {}; both waves explain {:.1} % of the variance{}, and leave a spread of {:.4}",
-        of_unit(format!("{:.4}", made.mean), " ", unit),
+        "mean {}; both waves explain {:.1} % of the variance{}, and leave a spread of {}",
+        of_unit(figures(made.mean, 4), " ", unit),
         made.explained_percent,
         if made.has_trend { " about a line" } else { "" },
-        made.residual_spread
+        figures(made.residual_spread, 4)
     );
     let amplitude = of_unit("amplitude".to_owned(), ", ", unit);
     let header = ["wave", amplitude.as_str(), "highest on"];
@@ -261,7 +262,7 @@ pub(super) fn of_difference(answer: &Difference) -> String {
 
 /// A row a band of the whole period.
 fn of_profile(answer: &Hovmoller, row: &HovmollerRow) -> String {
-    let number = |value: Option<f64>| value.map_or_else(String::new, |value| format!("{value:.3}"));
+    let number = |value: Option<f64>| value.map_or_else(String::new, |value| figures(value, 3));
     let bands = answer.bands.iter().enumerate().map(|(at, band)| {
         vec![
             format!("{}..{}", band.low_deg, band.high_deg),
@@ -293,7 +294,7 @@ pub(super) fn of_hovmoller(answer: &Hovmoller) -> String {
     let instants = Instants::of(answer.rows.iter().map(|row| row.start));
     let rows = answer.rows.iter().map(|row| {
         let means = shown.iter().map(|band| match row.means[*band] {
-            Some(mean) => format!("{mean:.3}"),
+            Some(mean) => figures(mean, 3),
             None => String::new(),
         });
         std::iter::once(instants.text(row.start))
@@ -315,5 +316,11 @@ mod tests {
     fn no_chance_is_zero() {
         let texts = [None, Some(0.04), Some(2e-7), Some(1e-299), Some(0.0)].map(chance);
         assert_eq!(texts, ["-", "0.0400", "2.0e-7", "1.0e-299", "< 1e-300"]);
+    }
+
+    #[test]
+    fn what_is_small_in_its_unit_is_no_zero() {
+        let texts = [None, Some(0.0), Some(1.5), Some(-5.763_9e-12)].map(number);
+        assert_eq!(texts, ["-", "0.0000", "1.5000", "-5.7639e-12"]);
     }
 }

@@ -5,6 +5,7 @@ use comfy_table::{CellAlignment, Table};
 use contract::budget::{BudgetAnswer, BudgetHistory, BudgetRow, RowDraws};
 
 use super::million_km2;
+use crate::figures::figures;
 use crate::instants::Instants;
 
 /// Columns of days and words, which stand to the left.
@@ -105,9 +106,8 @@ impl Columns {
     }
 
     fn cells(self, region: &str, row: &BudgetRow) -> Vec<String> {
-        let optional = |value: Option<f64>| {
-            value.map_or_else(|| "unknown".to_owned(), |value| format!("{value:.3}"))
-        };
+        let tg = |value: f64| figures(value, 3);
+        let optional = |value: Option<f64>| value.map_or_else(|| "unknown".to_owned(), tg);
         let mut cells = vec![];
         if self.region {
             cells.push(region.to_owned());
@@ -115,15 +115,16 @@ impl Columns {
         cells.extend([
             self.instants.text(row.start),
             self.instants.text(row.end),
-            format!("{:.3}", row.budget_tg),
+            tg(row.budget_tg),
         ]);
         if self.uncertainty {
             cells.push(optional(row.uncertainty.map(|own| own.sigma_tg)));
         }
         if self.draws {
             let drawn = draws(row);
-            let sigma = |own: RowDraws| format!("{:.3} ± {:.3}", own.sigma_tg, own.sigma_error_tg);
-            let between = |own: RowDraws| format!("{:.3} to {:.3}", own.p2_5_tg, own.p97_5_tg);
+            let sigma =
+                |own: RowDraws| format!("{} ± {}", tg(own.sigma_tg), tg(own.sigma_error_tg));
+            let between = |own: RowDraws| format!("{} to {}", tg(own.p2_5_tg), tg(own.p97_5_tg));
             let unknown = || "unknown".to_owned();
             cells.push(drawn.map_or_else(unknown, sigma));
             cells.push(drawn.map_or_else(unknown, between));
@@ -132,12 +133,12 @@ impl Columns {
             let of = |part: fn(&contract::budget::RowRiver) -> f64| {
                 row.river
                     .as_ref()
-                    .map_or_else(String::new, |own| format!("{:.3}", part(own)))
+                    .map_or_else(String::new, |own| tg(part(own)))
             };
             cells.extend([of(|own| own.river_tg), of(|own| own.anthropogenic_tg)]);
             if self.uncertainty {
                 let sigma = row.river.and_then(|own| own.sigma_tg);
-                cells.push(sigma.map_or_else(String::new, |sigma| format!("{sigma:.3}")));
+                cells.push(sigma.map_or_else(String::new, tg));
             }
         }
         cells.extend([
@@ -156,6 +157,12 @@ impl Columns {
     }
 }
 
+/// A change of a budget, Tg, with its sign.
+fn signed(change_tg: f64) -> String {
+    let sign = if change_tg < 0.0 { "" } else { "+" };
+    format!("{sign}{}", figures(change_tg, 3))
+}
+
 /// A line a version.
 pub(super) fn of_history(answer: &BudgetHistory) -> Table {
     let has_sigma = answer.versions.iter().any(|own| own.sigma_tg.is_some());
@@ -165,12 +172,10 @@ pub(super) fn of_history(answer: &BudgetHistory) -> Table {
     }
     header.extend(["change", "% of sea"]);
     let mut table = table(header);
+    let tg = |value: f64| figures(value, 3);
     for own in &answer.versions {
-        let number = |value: Option<f64>, decimals: usize| {
-            value.map_or_else(String::new, |value| format!("{value:.decimals$}"))
-        };
         let budget = match own.budget_tg {
-            Some(budget_tg) => format!("{budget_tg:.3}"),
+            Some(budget_tg) => tg(budget_tg),
             None => "no step in the period".to_owned(),
         };
         let mut cells = vec![
@@ -180,11 +185,26 @@ pub(super) fn of_history(answer: &BudgetHistory) -> Table {
             budget,
         ];
         if has_sigma {
-            cells.push(number(own.sigma_tg, 3));
+            cells.push(own.sigma_tg.map_or_else(String::new, tg));
         }
-        let change = own.difference_tg.map(|change| format!("{change:+.3}"));
-        cells.extend([change.unwrap_or_default(), number(own.coverage_percent, 1)]);
+        let change = own.difference_tg.map(signed);
+        let percent = own.coverage_percent.map(|percent| format!("{percent:.1}"));
+        cells.extend([change.unwrap_or_default(), percent.unwrap_or_default()]);
         table.add_row(cells);
     }
     table
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_change_below_a_gigagram_is_no_zero() {
+        let texts = [0.5, -1.25, 2e-4, -2e-4, 0.0].map(signed);
+        assert_eq!(
+            texts,
+            ["+0.500", "-1.250", "+2.000e-4", "-2.000e-4", "+0.000"]
+        );
+    }
 }
