@@ -496,6 +496,12 @@ async fn whatever_would_write_or_read_elsewhere_is_refused_with_the_reason() {
     let nested = format!("SELECT {}1{}", "(".repeat(5000), ")".repeat(5000));
     let told = ask(&sql, &nested).await.unwrap_err().to_string();
     assert!(told.contains("ecursion"), "{told}");
+    let chained = format!("SELECT 1{}", " + 1".repeat(60_000));
+    let told = ask(&sql, &chained).await.unwrap_err().to_string();
+    assert!(told.contains("operators one in another"), "{told}");
+    let joined = format!("SELECT 1 FROM sst_test{}", ", sst_test".repeat(20_000));
+    let told = ask(&sql, &joined).await.unwrap_err().to_string();
+    assert!(told.contains("queries, joins and tables"), "{told}");
     let there: Vec<_> = std::fs::read_dir(folder.path()).unwrap().collect();
     assert!(!outside.with_extension("csv.parquet").exists(), "{there:?}");
 }
