@@ -9,6 +9,7 @@ mod analysis;
 mod axes;
 mod budget;
 mod columns;
+mod copies;
 mod joined;
 mod limits;
 mod mean_weighted;

@@ -5,6 +5,7 @@ use datafusion::sql::sqlparser::ast::{
     DescribeAlias, SetExpr, ShowStatementOptions, Statement as Ansi,
 };
 
+use super::copies;
 use super::told::told;
 use crate::{ComputeError, depth};
 
@@ -53,7 +54,8 @@ pub(super) fn statement(text: &str) -> Result<Statement, ComputeError> {
             "{bytes} bytes are more than the {MAX_BYTES} of a question"
         ));
     }
-    depth::check(text).map_err(|reason| ComputeError::Sql { reason })?;
+    let checked = depth::check(text).and_then(|()| copies::check(text));
+    checked.map_err(|reason| ComputeError::Sql { reason })?;
     let parsed = DFParserBuilder::new(text).build();
     let parsed = parsed.and_then(|mut parser| parser.parse_statements());
     let mut statements = parsed.map_err(|error| with_hint(told(error, None)))?;

@@ -502,6 +502,11 @@ async fn whatever_would_write_or_read_elsewhere_is_refused_with_the_reason() {
     let joined = format!("SELECT 1 FROM sst_test{}", ", sst_test".repeat(20_000));
     let told = ask(&sql, &joined).await.unwrap_err().to_string();
     assert!(told.contains("queries, joins and tables"), "{told}");
+    let twice = |at: usize| format!(", t{} AS (SELECT x.a FROM t{at} x, t{at} y)", at + 1);
+    let steps: String = (0..30).map(twice).collect();
+    let doubling = format!("WITH t0 AS (SELECT 1 AS a){steps} SELECT count(*) FROM t30");
+    let told = ask(&sql, &doubling).await.unwrap_err().to_string();
+    assert!(told.contains("is read"), "{told}");
     let there: Vec<_> = std::fs::read_dir(folder.path()).unwrap().collect();
     assert!(!outside.with_extension("csv.parquet").exists(), "{there:?}");
 }
