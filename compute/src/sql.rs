@@ -25,6 +25,7 @@ mod selection;
 mod session;
 mod statement;
 mod statistics;
+mod substituted;
 mod tables;
 mod told;
 mod version;

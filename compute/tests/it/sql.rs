@@ -549,6 +549,30 @@ async fn texts_are_joined_and_those_that_would_double_without_end_are_refused() 
     }
 }
 
+/// Columns each of which is computed so of the one before.
+fn computed_of_computed(times: usize, computed: &str) -> String {
+    let next = |at: usize| format!(", t{} AS (SELECT {computed} AS a FROM t{at})", at + 1);
+    let steps: String = (0..times).map(next).collect();
+    format!(
+        "WITH t0 AS (SELECT column1 AS a FROM (VALUES (1), (2)) AS v){steps} SELECT count(*) FROM t{times} WHERE a > 1"
+    )
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_condition_that_doubles_where_columns_are_written_out_is_refused() {
+    let (_folder, store) = folder_store();
+    sst(&store).await;
+    let sql = sql_of(&Engine::in_process(store, parts(1)));
+    assert_eq!(one(&sql, &computed_of_computed(5, "a + a")).await, "2");
+    assert_eq!(one(&sql, &computed_of_computed(40, "a + 0")).await, "1");
+    let doubling = computed_of_computed(40, "a + a");
+    let within = format!("SELECT (SELECT max(n) FROM ({doubling}) AS s(n))");
+    for text in [doubling, within] {
+        let error = ask(&sql, &text).await.unwrap_err().to_string();
+        assert!(error.contains("written out"), "{error}");
+    }
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn a_question_that_never_ends_is_ended_and_so_is_one_that_nobody_waits_for() {
     let (_folder, store) = folder_store();
