@@ -62,6 +62,8 @@ struct Depths {
     /// Operators one in another in the deepest expression of each query.
     deepest: Vec<usize>,
     query_count: usize,
+    /// Words of IS DISTINCT FROM that were just read: no tables come after that.
+    compared: usize,
 }
 
 impl Depths {
@@ -90,6 +92,12 @@ impl Depths {
     }
 
     fn word(&mut self, keyword: Keyword) {
+        self.compared = match (keyword, self.compared) {
+            (Keyword::IS, _) | (Keyword::NOT, 1) => 1,
+            (Keyword::DISTINCT, 1) => 2,
+            (Keyword::FROM, 2) => 3,
+            _ => 0,
+        };
         match keyword {
             Keyword::SELECT => {
                 self.query_count += 1;
@@ -107,7 +115,7 @@ impl Depths {
             | Keyword::INTERSECT
             | Keyword::PIVOT
             | Keyword::UNPIVOT => self.query_count += 1,
-            Keyword::FROM => self.now.is_from = true,
+            Keyword::FROM => self.now.is_from |= self.compared != 3,
             Keyword::GROUP | Keyword::ORDER | Keyword::LIMIT => self.now.is_from = false,
             Keyword::WHERE | Keyword::HAVING => {
                 self.now.is_from = false;
@@ -225,6 +233,8 @@ mod tests {
             many(2000, |_| "FROM t".into(), " UNION ALL "),
             format!("SELECT 1 FROM {}", many(2000, |at| format!("t{at}"), ", ")),
             format!("SELECT 1 FROM t{}", " JOIN t USING (a)".repeat(2000)),
+            format!("SELECT a IS NULL FROM t{}", ", t".repeat(2000)),
+            format!("SELECT DISTINCT FROM t{}", ", t".repeat(2000)),
             format!("FROM t{}", " |> WHERE a".repeat(2000)),
             format!("WITH {} SELECT 1", many(2000, chained, ", ")),
             format!("WITH {} SELECT 1", many(60, sums, ", ")),
@@ -259,6 +269,7 @@ mod tests {
                 " UNION ALL ",
             ),
             format!("SELECT {}1{}", "(".repeat(3000), ")".repeat(3000)),
+            format!("SELECT a IS NOT DISTINCT FROM b{}", ", c".repeat(1000)),
             "SELECT 'it ends nowhere".to_owned(),
         ] {
             let start: String = text.chars().take(60).collect();
