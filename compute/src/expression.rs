@@ -26,6 +26,8 @@ use rewrite::Outside;
 use typed::Typed;
 use unit::Unit;
 
+use crate::depth;
+
 /// Longest text of an expression, bytes.
 pub const MAX_BYTES: usize = 8192;
 /// Most names in one.
@@ -83,6 +85,7 @@ impl Expression {
         if inputs.len() > MAX_INPUTS {
             return Err(format!("it has more than {MAX_INPUTS} inputs"));
         }
+        depth::check(text)?;
         let field = |(name, _unit): &(String, Unit)| Field::new(name, DataType::Float64, true);
         let schema = Arc::new(Schema::new(inputs.iter().map(field).collect::<Vec<_>>()));
         let in_words = |e: DataFusionError| in_words(&e);

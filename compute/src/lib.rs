@@ -12,6 +12,7 @@ pub mod check;
 pub mod cluster;
 pub mod computed;
 pub mod dependents;
+mod depth;
 pub mod derive;
 mod error;
 pub mod expression;

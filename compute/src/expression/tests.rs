@@ -219,6 +219,7 @@ fn mixed_units_and_whatever_is_no_arithmetic_are_refused_with_the_reason() {
         ("", ""),
         (&"(".repeat(3000), ""),
         (&"ice+".repeat(2500), "longer than"),
+        (&format!("ice{}", "+1".repeat(4000)), "one in another"),
     ] {
         let refused = read(text).map(|_| ()).unwrap_err();
         assert!(refused.contains(reason), "{text}: {refused}");

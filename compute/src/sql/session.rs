@@ -30,7 +30,7 @@ use super::tables::Tables;
 use super::told::{overdue, told};
 use super::worked_out::AnswerFunction;
 use super::yielding::Yielding;
-use super::{analysis, budget, joined, statistics};
+use super::{analysis, budget, joined, statistics, substituted};
 use crate::expression::udf::number_functions;
 use crate::{ComputeError, Engine};
 
@@ -193,6 +193,7 @@ impl Sql {
                 reason: format!("{}: SQL here reads only", error.strip_backtrace()),
             })?;
         joined::check(&plan, text.len())?;
+        substituted::check(&plan)?;
         context.execute_logical_plan(plan).await.map_err(failed)
     }
 

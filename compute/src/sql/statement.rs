@@ -5,8 +5,9 @@ use datafusion::sql::sqlparser::ast::{
     DescribeAlias, SetExpr, ShowStatementOptions, Statement as Ansi,
 };
 
+use super::copies;
 use super::told::told;
-use crate::ComputeError;
+use crate::{ComputeError, depth};
 
 /// Longest text of a question: nobody writes more by hand, and programs need not.
 const MAX_BYTES: usize = 256 << 10;
@@ -45,7 +46,7 @@ pub(super) const LARGE: [&str; 24] = [
 /// The statement of a text.
 ///
 /// # Errors
-/// `Sql`: it is no SQL, more than one statement, or does more than ask.
+/// `Sql`: it is no SQL, more than one statement, deeper than a stack, or does more than ask.
 pub(super) fn statement(text: &str) -> Result<Statement, ComputeError> {
     if text.len() > MAX_BYTES {
         let bytes = text.len();
@@ -53,6 +54,8 @@ pub(super) fn statement(text: &str) -> Result<Statement, ComputeError> {
             "{bytes} bytes are more than the {MAX_BYTES} of a question"
         ));
     }
+    let checked = depth::check(text).and_then(|()| copies::check(text));
+    checked.map_err(|reason| ComputeError::Sql { reason })?;
     let parsed = DFParserBuilder::new(text).build();
     let parsed = parsed.and_then(|mut parser| parser.parse_statements());
     let mut statements = parsed.map_err(|error| with_hint(told(error, None)))?;

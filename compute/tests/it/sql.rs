@@ -496,6 +496,17 @@ async fn whatever_would_write_or_read_elsewhere_is_refused_with_the_reason() {
     let nested = format!("SELECT {}1{}", "(".repeat(5000), ")".repeat(5000));
     let told = ask(&sql, &nested).await.unwrap_err().to_string();
     assert!(told.contains("ecursion"), "{told}");
+    let chained = format!("SELECT 1{}", " + 1".repeat(60_000));
+    let told = ask(&sql, &chained).await.unwrap_err().to_string();
+    assert!(told.contains("operators one in another"), "{told}");
+    let joined = format!("SELECT 1 FROM sst_test{}", ", sst_test".repeat(20_000));
+    let told = ask(&sql, &joined).await.unwrap_err().to_string();
+    assert!(told.contains("queries, joins and tables"), "{told}");
+    let twice = |at: usize| format!(", t{} AS (SELECT x.a FROM t{at} x, t{at} y)", at + 1);
+    let steps: String = (0..30).map(twice).collect();
+    let doubling = format!("WITH t0 AS (SELECT 1 AS a){steps} SELECT count(*) FROM t30");
+    let told = ask(&sql, &doubling).await.unwrap_err().to_string();
+    assert!(told.contains("is read"), "{told}");
     let there: Vec<_> = std::fs::read_dir(folder.path()).unwrap().collect();
     assert!(!outside.with_extension("csv.parquet").exists(), "{there:?}");
 }
@@ -535,6 +546,30 @@ async fn texts_are_joined_and_those_that_would_double_without_end_are_refused() 
     ] {
         let error = ask(&sql, endless).await.unwrap_err().to_string();
         assert!(error.contains("may have more than 4 MiB"), "{error}");
+    }
+}
+
+/// Columns each of which is computed so of the one before.
+fn computed_of_computed(times: usize, computed: &str) -> String {
+    let next = |at: usize| format!(", t{} AS (SELECT {computed} AS a FROM t{at})", at + 1);
+    let steps: String = (0..times).map(next).collect();
+    format!(
+        "WITH t0 AS (SELECT column1 AS a FROM (VALUES (1), (2)) AS v){steps} SELECT count(*) FROM t{times} WHERE a > 1"
+    )
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_condition_that_doubles_where_columns_are_written_out_is_refused() {
+    let (_folder, store) = folder_store();
+    sst(&store).await;
+    let sql = sql_of(&Engine::in_process(store, parts(1)));
+    assert_eq!(one(&sql, &computed_of_computed(5, "a + a")).await, "2");
+    assert_eq!(one(&sql, &computed_of_computed(40, "a + 0")).await, "1");
+    let doubling = computed_of_computed(40, "a + a");
+    let within = format!("SELECT (SELECT max(n) FROM ({doubling}) AS s(n))");
+    for text in [doubling, within] {
+        let error = ask(&sql, &text).await.unwrap_err().to_string();
+        assert!(error.contains("written out"), "{error}");
     }
 }
 

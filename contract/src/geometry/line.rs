@@ -187,6 +187,12 @@ fn no_line(kind: &str) -> String {
 }
 
 fn from_wkt(text: &str) -> Result<Parts, String> {
+    let word = text.split(|c: char| !c.is_ascii_alphabetic()).next();
+    let kind = word.unwrap_or_default().to_ascii_uppercase();
+    // The parser goes down a collection as deep as its text has it, and a million fit into one: the stack would overflow.
+    if kind.starts_with("GEOMETRYCOLLECTION") {
+        return Err(no_line(&kind));
+    }
     let parsed: Wkt<f64> = text
         .parse()
         .map_err(|e| format!("it is no well-known text: {e}"))?;
@@ -256,6 +262,19 @@ mod tests {
         assert!(reason(r#"{"type":"FeatureCollection","features":[]}"#).contains("no part"));
         assert!(reason("LINESTRING(0 0,1 1),LINESTRING(5 5,6 6)").contains("does not end"));
         assert!(reason("LINESTRING(0 0,1 1) LINESTRING(5 5,6 6)").contains("does not end"));
+        assert!(reason("GEOMETRYCOLLECTION(LINESTRING(0 0,1 1))").contains("no line"));
+    }
+
+    #[test]
+    fn a_collection_as_deep_as_its_text_is_refused_and_overflows_no_stack() {
+        for word in [
+            "GEOMETRYCOLLECTION(",
+            "GeometryCollection Z (",
+            "geometrycollectionzm(",
+        ] {
+            let told = reason(&word.repeat(1_000_000));
+            assert!(told.contains("no line"), "{told}");
+        }
     }
 
     #[test]
