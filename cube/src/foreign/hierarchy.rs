@@ -122,7 +122,7 @@ impl Foreign {
     /// with what it names.
     ///
     /// # Errors
-    /// It cannot be read. An array that cannot is told where it is asked for.
+    /// It cannot be read, or an array does not answer now. An array that cannot be read is told where it is asked for.
     pub async fn open(
         objects: Arc<dyn Objects>,
         found: Found,
@@ -237,7 +237,10 @@ impl Foreign {
                 }
             }
         }
-        Ok(own)
+        // What does not answer now is not what is not there: without its bounds a coordinate means something else.
+        let mut failed = own.arrays.values().filter_map(|array| array.as_ref().err());
+        let away = failed.find(|error| error.is_retryable()).cloned();
+        away.map_or(Ok(own), Err)
     }
 
     /// Opens an array; what is none is left out.

@@ -1,9 +1,12 @@
-//! What changed between two states of a repository, damage of what names its chunks, and chunks that lie elsewhere.
+//! What changed between two states of a repository, damage of what names its chunks, and chunks that lie elsewhere; arrays that do
+//! not answer.
 
 use std::ops::Range;
 use std::path::Path as FilePath;
 use std::sync::Arc;
 
+use async_trait::async_trait;
+use bytes::Bytes;
 use contract::grid::Grid;
 use contract::quantity::Quantity;
 use contract::time::Period;
@@ -16,12 +19,14 @@ use icechunk::format::{ChunkIndices, Path};
 use icechunk::storage::Settings;
 use icechunk::virtual_chunks::VirtualChunkContainer;
 use icechunk::{ObjectStoreConfig, RepositoryConfig};
+use object_store::GetRange;
+use serde_json::json;
 use storage::Store;
 use storage::attached::StoreKind;
 use tempfile::TempDir;
 
 use super::read_only::ReadOnly;
-use super::{Absent, Foreign, ForeignError, Found, StoredObjects};
+use super::{Absent, Foreign, ForeignError, Found, Objects, StoredObjects};
 use crate::{Description, Edit, Repository, cf};
 
 /// Two chunks side by side.
@@ -341,4 +346,72 @@ async fn the_configuration_of_a_repository_of_version_1_is_never_read() {
     let settings = Settings::default();
     let assets = AssetManager::new_no_cache(storage, settings, SpecVersionBin::V1, 1, 16);
     assert!(assets.fetch_config().await.unwrap().is_none());
+}
+
+/// A group of a latitude and its bounds, each with a document of its own.
+#[derive(Debug)]
+struct Latitudes {
+    /// An object that does not answer.
+    silent: Option<&'static str>,
+}
+
+#[async_trait]
+impl Objects for Latitudes {
+    fn place(&self) -> String {
+        "latitudes".to_owned()
+    }
+
+    async fn get(
+        &self,
+        name: &str,
+        _part: Option<GetRange>,
+        _most_bytes: u64,
+    ) -> Result<Option<Bytes>, ForeignError> {
+        if self.silent == Some(name) {
+            return Err(ForeignError::away(name, "does not answer"));
+        }
+        let array = |shape: &[u64]| {
+            json!({
+                "zarr_format": 3,
+                "node_type": "array",
+                "shape": shape,
+                "data_type": "float64",
+                "chunk_grid": {"name": "regular", "configuration": {"chunk_shape": shape}},
+                "chunk_key_encoding": {"name": "default", "configuration": {"separator": "/"}},
+                "fill_value": 0.0,
+                "codecs": [{"name": "bytes", "configuration": {"endian": "little"}}],
+                "attributes": {},
+            })
+        };
+        let document = match name {
+            "zarr.json" => json!({"zarr_format": 3, "node_type": "group", "attributes": {}}),
+            "lat/zarr.json" => array(&[4]),
+            "lat_bnds/zarr.json" => array(&[4, 2]),
+            _ => return Ok(None),
+        };
+        Ok(Some(document.to_string().into()))
+    }
+
+    async fn size(&self, _name: &str) -> Result<Option<u64>, ForeignError> {
+        Ok(None)
+    }
+
+    async fn folders(&self, _folder: &str) -> Result<Option<Vec<String>>, ForeignError> {
+        Ok(Some(vec!["lat".to_owned(), "lat_bnds".to_owned()]))
+    }
+}
+
+#[tokio::test]
+async fn an_array_that_does_not_answer_is_not_one_that_is_not_there() {
+    let open = async |silent| {
+        let found = Found {
+            kind: StoreKind::Zarr3,
+            snapshot: None,
+        };
+        Foreign::open(Arc::new(Latitudes { silent }), found, None).await
+    };
+    assert_eq!(open(None).await.unwrap().arrays().count(), 2);
+    let error = open(Some("lat_bnds/zarr.json")).await.err().unwrap();
+    assert!(error.is_retryable(), "{error}");
+    assert!(error.to_string().contains("array lat_bnds"), "{error}");
 }

@@ -42,8 +42,8 @@ impl Scheme {
         let meanings = variable.attributes.text("flag_meanings");
         match (values, meanings) {
             (Some(values), Some(meanings)) => {
-                let words = meanings.split_whitespace();
-                Self::Stated(values.into_iter().zip(words.map(meaning)).collect())
+                let verdicts = verdicts(meanings, values.len());
+                Self::Stated(values.into_iter().zip(verdicts).collect())
             }
             _ if is_of_woce(&variable.name) => Self::Woce,
             _ => Self::Primary,
@@ -164,6 +164,23 @@ pub(super) fn worse(a: Verdict, b: Verdict) -> Verdict {
     a.zip(b).map(|(a, b)| a.max(b))
 }
 
+/// What `flag_meanings` say of each of so many flags: a word a flag, or a phrase between commas or semicolons. Nothing if there are
+/// more or fewer: with those of its neighbours what is bad would be good.
+fn verdicts(meanings: &str, count: usize) -> Vec<Verdict> {
+    let words: Vec<Verdict> = meanings.split_whitespace().map(meaning).collect();
+    if words.len() == count {
+        return words;
+    }
+    let phrases = meanings.trim_end_matches([',', ';']).split([',', ';']);
+    let phrase = |text: &str| meaning(&text.trim().replace(' ', "_"));
+    let phrases: Vec<Verdict> = phrases.map(phrase).collect();
+    if phrases.len() == count {
+        phrases
+    } else {
+        vec![]
+    }
+}
+
 /// What one word of `flag_meanings` says.
 fn meaning(word: &str) -> Verdict {
     let word = word.to_ascii_lowercase();
@@ -271,6 +288,28 @@ mod tests {
         // Nothing says what these mean: 4 is no "bad".
         let unsaid = Scheme::of(&variable("state", &[("flag_masks", masks)]));
         assert_eq!(unsaid.verdict(4.0), Some(NotEvaluated));
+    }
+
+    #[test]
+    fn meanings_that_are_no_word_a_flag_are_not_those_of_its_neighbours() {
+        let verdicts = |meanings: &str| {
+            let kind = Kind::Integer(1);
+            let bits = [0.0_f64, 1.0, 4.0].map(Into::into).to_vec();
+            let values = AttributeValue::Numbers { kind, bits };
+            let meanings = AttributeValue::Text(meanings.to_owned());
+            let told = [("flag_values", values), ("flag_meanings", meanings)];
+            let scheme = Scheme::of(&variable("temp_qc", &told));
+            [0.0, 1.0, 4.0].map(|flag| scheme.verdict(flag))
+        };
+        let told = [Some(NotEvaluated), Some(Good), Some(Bad)];
+        assert_eq!(verdicts("no_qc good_data bad_data"), told);
+        assert_eq!(verdicts("no QC, good data, bad data"), told);
+        // By its place the third word, "good", would be of 4.
+        assert_eq!(
+            verdicts("no QC good data bad data"),
+            [Some(NotEvaluated); 3]
+        );
+        assert_eq!(verdicts("good bad"), [Some(NotEvaluated); 3]);
     }
 
     #[test]

@@ -1,9 +1,11 @@
-//! HDF5 files with attributes of any size and number: what is kept of them is bounded, and the file lands.
+//! HDF5 files with attributes of any size and number: what is kept of them is bounded, and the file lands. One whose attributes are
+//! damaged does not.
 
+use contract::event::RejectReason;
 use hdf5::Location;
 use ingest::Outcome;
 
-use crate::fixture::{Place, SmallFile, text};
+use crate::fixture::{Place, SmallFile, refusal, text};
 
 /// More than the reader may say of a file.
 const HUGE_BYTES: usize = 32 << 20;
@@ -49,5 +51,41 @@ async fn attributes_of_any_size_and_number_are_bounded_and_their_file_lands() {
             matches!(outcomes[..], [Outcome::Landed { .. }]),
             "{name}: {outcomes:?}"
         );
+    }
+}
+
+/// In the newest format, whose headers and blocks have checksums, a file of one dataset with more attributes than its header holds.
+/// One byte of the last block of a kind is another.
+fn damaged(place: &Place, kind: &[u8; 4]) -> std::path::PathBuf {
+    let path = place.path("damaged.h5");
+    let file = hdf5::File::with_options()
+        .with_fapl(hdf5::plist::FileAccessBuilder::libver_latest)
+        .create(&path)
+        .unwrap();
+    let dataset = file.new_dataset::<f32>().shape([2]).create("beside");
+    let dataset = dataset.unwrap();
+    for index in 0..16 {
+        let attribute = dataset.new_attr::<f64>().create(&*format!("number{index}"));
+        attribute.unwrap().write_scalar(&0.01).unwrap();
+    }
+    drop(dataset);
+    file.close().unwrap();
+    let mut content = std::fs::read(&path).unwrap();
+    let found = content.windows(4).rposition(|bytes| bytes == kind);
+    content[found.expect("there is such a block")] ^= 1;
+    std::fs::write(&path, content).unwrap();
+    path
+}
+
+#[tokio::test]
+async fn damaged_attributes_and_datasets_are_not_taken_for_none() {
+    // The block of attributes, and the header of the dataset.
+    for kind in [b"FHDB", b"OHDR"] {
+        let place = Place::new();
+        let path = damaged(&place, kind);
+        let (reason, line) = refusal(&place.land(&[path]).await);
+        assert_eq!(reason, RejectReason::Corrupt, "{line}");
+        assert!(line.contains("beside"), "{line}");
+        assert!(line.contains("fetch it again"), "{line}");
     }
 }

@@ -3,11 +3,13 @@
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use contract::digest::Digest;
+use contract::key::ObjectKey;
 use contract::time::TimeMs;
 use ingest::{LandingNotes, Readings};
-use storage::Store;
-use storage::gc::{self, Keep, Owner, Versions};
+use storage::gc::{self, Keep, Kept, Owner, Versions};
+use storage::{StorageError, Store};
 
+use crate::attached::Own;
 use crate::fixture::{Place, SmallFile};
 
 const OWNERS: [&dyn Owner; 3] = [&Versions, &Readings, &LandingNotes];
@@ -61,4 +63,39 @@ async fn notes_of_landings_stay_as_long_as_a_notice_may_come_again() {
     // Other old things go after a day; a topic keeps notices for 30.
     assert!(doomed(&place.store, 31).await.is_empty());
     assert_eq!(doomed(&place.store, 46).await, [note]);
+}
+
+#[tokio::test]
+async fn what_references_that_cannot_be_read_refer_to_stays() {
+    let own = Own::with("v2-plain.zarr");
+    own.attach().await.unwrap();
+    let mut version = own.newest().await;
+    let attachment = ObjectKey::raw(&version.product, &version.steps[0].raw_sha256);
+    // Where the product was attached again, the version names what it was attached to before.
+    for step in &mut version.steps {
+        step.raw_sha256 = Digest::of(b"before");
+    }
+    let kept = Kept {
+        manifests: vec![version],
+        versions: 1,
+    };
+    let in_use = Versions.in_use(&own.store, &kept).await.unwrap();
+    assert!(in_use.contains(&attachment));
+    let bare = own.store.bare();
+    for step in &kept.manifests[0].steps {
+        let path = object_store::path::Path::from(step.field.as_str());
+        let objects = bare.object_store();
+        let found = object_store::ObjectStoreExt::get(&objects, &path).await;
+        let mut reference = found.unwrap().bytes().await.unwrap().to_vec();
+        let middle = reference.len() / 2;
+        reference[middle] ^= 1;
+        bare.put_over(&step.field, reference.into()).await.unwrap();
+        let read = own.store.reference(&step.field).await;
+        assert!(
+            matches!(read, Err(StorageError::Damaged { .. })),
+            "{read:?}"
+        );
+    }
+    let in_use = Versions.in_use(&own.store, &kept).await.unwrap();
+    assert!(in_use.contains(&attachment));
 }

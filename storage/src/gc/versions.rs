@@ -53,22 +53,36 @@ impl Owner for Versions {
 }
 
 /// What the steps of an attached version refer to: that is newer than what the version names where the product was attached
-/// again.
+/// again. All that was ever attached of the product where one of them cannot be read.
 async fn attachments(
     store: &Store,
     manifest: &Manifest,
 ) -> Result<BTreeSet<ObjectKey>, StorageError> {
     let mut keys = BTreeSet::new();
-    if store.attached_to(manifest).await?.is_none() {
+    if store.bare.is_none() {
         return Ok(keys);
     }
-    for step in &manifest.steps {
+    let (product, steps) = (&manifest.product, &manifest.steps);
+    // Most versions refer to nothing, as their ends say: those have their values here.
+    let mut has_values = true;
+    for step in steps.first().into_iter().chain(steps.last()) {
+        has_values &= matches!(store.reference(&step.field).await, Ok(None));
+    }
+    if has_values {
+        return Ok(keys);
+    }
+    for step in steps {
         match store.reference(&step.field).await {
             Ok(Some(reference)) => {
-                keys.insert(ObjectKey::raw(&manifest.product, &reference.attachment));
+                keys.insert(ObjectKey::raw(product, &reference.attachment));
             }
-            Ok(None) | Err(StorageError::Damaged { .. }) => {}
+            Ok(None) => {}
             Err(e) if e.is_not_found() => {}
+            // It is damaged, or of a newer program, and may refer to any of them.
+            Err(StorageError::Damaged { .. }) => {
+                let folder = format!("{}/{product}", Kind::Raw.folder());
+                return Ok(store.list(&folder).await?.into_iter().collect());
+            }
             Err(e) => return Err(e),
         }
     }

@@ -1,7 +1,7 @@
 //! Attributes of HDF5 objects: bounded numbers and texts out; references and compounds are passed over.
 
 use hdf5::types::{FixedAscii, FixedUnicode, TypeDescriptor, VarLenAscii, VarLenUnicode};
-use hdf5::{Attribute, Datatype, Location};
+use hdf5::{Attribute, Datatype, H5Type, Location};
 
 use super::description::{
     AttributeValue, Attributes, Kind, MAX_ATTRIBUTE_NUMBERS, MAX_ATTRIBUTE_TEXT_BYTES,
@@ -18,52 +18,70 @@ const INTERNAL: [&str; 6] = [
     "_nc3_strict",
 ];
 
-/// All attributes that are numbers or text; one that cannot be read is left out, as if it were not there.
-pub(super) fn read_all(owner: &Location) -> Attributes {
-    let names = owner.attr_names().unwrap_or_default();
+/// All attributes that are numbers or text.
+///
+/// # Errors
+/// What cannot be read, in words, and why: as if it were not there, packed numbers would be taken for values.
+pub(super) fn read_all(owner: &Location) -> Result<Attributes, (String, hdf5::Error)> {
+    let names = owner.attr_names();
+    let names = names.map_err(|e| ("the list of its attributes".to_owned(), e))?;
     let wanted = names
         .into_iter()
         .filter(|n| n.len() <= MAX_NAME_BYTES && !INTERNAL.contains(&n.as_str()));
-    wanted
-        .take(MAX_ATTRIBUTES)
-        .filter_map(|name| Some((name.clone(), read(&owner.attr(&name).ok()?)?)))
-        .collect()
+    let mut all = vec![];
+    for name in wanted.take(MAX_ATTRIBUTES) {
+        let value = owner.attr(&name).and_then(|attribute| read(&attribute));
+        // The library gives names of a damaged file as they are, which may be no text.
+        let shown = || String::from_utf8_lossy(name.as_bytes());
+        let value = value.map_err(|e| (format!("its attribute {:?}", shown()), e))?;
+        all.extend(value.map(|value| (name, value)));
+    }
+    Ok(all.into_iter().collect())
 }
 
-fn read(attribute: &Attribute) -> Option<AttributeValue> {
-    let count = attribute.space().ok()?.size();
+/// The value of an attribute; none of one that is neither numbers nor text, or holds too many.
+fn read(attribute: &Attribute) -> Result<Option<AttributeValue>, hdf5::Error> {
+    let count = attribute.space()?.size();
     if count == 0 || count > MAX_ATTRIBUTE_NUMBERS {
-        return None;
+        return Ok(None);
     }
-    let stored = attribute.dtype().ok()?;
+    let stored = attribute.dtype()?;
     if let Some(kind) = kind(&stored) {
-        return numbers(attribute, kind);
+        return numbers(attribute, kind).map(Some);
     }
-    match stored.to_descriptor().ok()? {
+    // Types that the library has no name for are none of text.
+    let Ok(descriptor) = stored.to_descriptor() else {
+        return Ok(None);
+    };
+    match descriptor {
         TypeDescriptor::FixedAscii(_) => {
-            let texts = attribute
-                .read_raw::<FixedAscii<MAX_ATTRIBUTE_TEXT_BYTES>>()
-                .ok()?;
-            Some(joined(&texts, |t| t.as_bytes()))
+            texts::<FixedAscii<MAX_ATTRIBUTE_TEXT_BYTES>>(attribute, &stored, FixedAscii::as_bytes)
         }
-        TypeDescriptor::FixedUnicode(_) => {
-            let texts = attribute
-                .read_raw::<FixedUnicode<MAX_ATTRIBUTE_TEXT_BYTES>>()
-                .ok()?;
-            Some(joined(&texts, |t| t.as_bytes()))
-        }
+        TypeDescriptor::FixedUnicode(_) => texts::<FixedUnicode<MAX_ATTRIBUTE_TEXT_BYTES>>(
+            attribute,
+            &stored,
+            FixedUnicode::as_bytes,
+        ),
         TypeDescriptor::VarLenAscii => {
-            Some(joined(&attribute.read_raw::<VarLenAscii>().ok()?, |t| {
-                t.as_bytes()
-            }))
+            texts::<VarLenAscii>(attribute, &stored, VarLenAscii::as_bytes)
         }
         TypeDescriptor::VarLenUnicode => {
-            Some(joined(&attribute.read_raw::<VarLenUnicode>().ok()?, |t| {
-                t.as_bytes()
-            }))
+            texts::<VarLenUnicode>(attribute, &stored, VarLenUnicode::as_bytes)
         }
-        _ => None,
+        _ => Ok(None),
     }
+}
+
+/// The texts of an attribute; none where the library does not turn its type into this one.
+fn texts<T: H5Type>(
+    attribute: &Attribute,
+    stored: &Datatype,
+    bytes: impl Fn(&T) -> &[u8],
+) -> Result<Option<AttributeValue>, hdf5::Error> {
+    if stored.conv_to::<T>().is_none() {
+        return Ok(None);
+    }
+    Ok(Some(joined(&attribute.read_raw::<T>()?, bytes)))
 }
 
 /// How numbers of a type are stored; none if it is no type of numbers.
@@ -81,9 +99,9 @@ pub(super) fn kind(stored: &Datatype) -> Option<Kind> {
     }
 }
 
-fn numbers(attribute: &Attribute, kind: Kind) -> Option<AttributeValue> {
-    let numbers = attribute.read_raw::<f64>().ok()?;
-    Some(AttributeValue::Numbers {
+fn numbers(attribute: &Attribute, kind: Kind) -> Result<AttributeValue, hdf5::Error> {
+    let numbers = attribute.read_raw::<f64>()?;
+    Ok(AttributeValue::Numbers {
         kind,
         bits: numbers.into_iter().map(Into::into).collect(),
     })

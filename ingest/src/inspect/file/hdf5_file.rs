@@ -11,7 +11,8 @@ use hdf5::dataset::Layout;
 use hdf5::filters::Filter;
 use hdf5::types::VarLenArray;
 use hdf5::{
-    Dataset, File, LinkType, ObjectReference as _, ObjectReference1, ReferencedObject, SliceOrIndex,
+    Dataset, File, LinkType, Location, LocationType, ObjectReference as _, ObjectReference1,
+    ReferencedObject, SliceOrIndex,
 };
 
 use super::corrupt;
@@ -167,10 +168,17 @@ fn describe(file: &File) -> Result<(Description, usize), Rejection> {
     let mut variables = Vec::new();
     let (mut most_bytes, mut most_chunk_bytes) = (0, 0);
     for name in names {
-        // A member that is no dataset (a group, a named type) or cannot be opened is passed over.
-        if let Ok(dataset) = file.dataset(&name)
-            && let Some(variable) = describe_dataset(file, &name, &dataset)?
-        {
+        let damaged = |e: hdf5::Error| {
+            let why = first_line(&e);
+            let detail = format!("cannot be opened ({why}); the file is damaged, fetch it again");
+            corrupt(&name, detail)
+        };
+        // A member that is no dataset (a group, a named type) is passed over. One that is damaged is not: it may be the flags of another.
+        if file.loc_type_by_name(&name).map_err(damaged)? != LocationType::Dataset {
+            continue;
+        }
+        let dataset = file.dataset(&name).map_err(damaged)?;
+        if let Some(variable) = describe_dataset(file, &name, &dataset)? {
             most_bytes = most_bytes.max(library_bytes(&dataset, variable.cell_count()));
             most_chunk_bytes = most_chunk_bytes.max(chunk_bytes(&dataset).unwrap_or(0));
             variables.push(variable);
@@ -183,11 +191,20 @@ fn describe(file: &File) -> Result<(Description, usize), Rejection> {
     };
     let description = Description {
         format: format.to_owned(),
-        attributes: hdf5_attribute::read_all(file),
+        attributes: attributes_of("file", file)?,
         variables,
         library_bytes: most_bytes,
     };
     Ok((description, most_chunk_bytes as usize))
+}
+
+/// What is said of the file or of a dataset, by its name.
+fn attributes_of(name: &str, owner: &Location) -> Result<Attributes, Rejection> {
+    hdf5_attribute::read_all(owner).map_err(|(what, e)| {
+        let why = first_line(&e);
+        let detail = format!("{what} cannot be read ({why}); the file is damaged, fetch it again");
+        corrupt(name, detail)
+    })
 }
 
 /// Most memory that the library takes to unpack values of a dataset: its cache, as far as there are chunks to fill it,
@@ -236,7 +253,7 @@ fn describe_dataset(
         )
     };
     let shape = dataset.get_shape().map_err(damaged)?;
-    let attributes = hdf5_attribute::read_all(dataset);
+    let attributes = attributes_of(name, dataset)?;
     if attributes
         .text("NAME")
         .is_some_and(|text| text.starts_with(NO_VARIABLE))

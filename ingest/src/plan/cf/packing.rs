@@ -104,7 +104,7 @@ impl Packing {
         let attributes = &variable.attributes;
         let mut fills: Vec<f64> = ["_FillValue", "missing_value"]
             .into_iter()
-            .filter_map(|name| attributes.numbers(name))
+            .filter_map(|name| numbers(variable, name))
             .flatten()
             .map(|fill| as_stored(variable.kind, fill))
             .collect();
@@ -120,8 +120,8 @@ impl Packing {
             _ => None,
         };
         let mut packing = Self {
-            scale: attributes.number("scale_factor").unwrap_or(1.0),
-            offset: attributes.number("add_offset").unwrap_or(0.0),
+            scale: number(variable, "scale_factor", 1.0),
+            offset: number(variable, "add_offset", 0.0),
             fills,
             valid_stored: ANY,
             valid_values: ANY,
@@ -215,6 +215,28 @@ impl Packing {
             Some(wrap) if stored < 0.0 => stored + wrap,
             _ => stored,
         }
+    }
+}
+
+/// The numbers of an attribute, or of its text, which some writers give in their place.
+fn numbers(variable: &Variable, name: &str) -> Option<Vec<f64>> {
+    let of_text = || -> Option<Vec<f64>> {
+        let text = variable.attributes.text(name)?;
+        let words = text.split([' ', ',']).filter(|word| !word.is_empty());
+        words.map(|word| word.parse().ok()).collect()
+    };
+    let own = variable.attributes.numbers(name);
+    // The fill value of text is a letter.
+    own.or_else(|| variable.is_numeric().then(of_text).flatten())
+}
+
+/// The number of an attribute, `usual` if it is not there. Of text that is no number NaN, which planning refuses: values would be
+/// taken as they are packed.
+fn number(variable: &Variable, name: &str, usual: f64) -> f64 {
+    match numbers(variable, name) {
+        Some(all) => all.first().copied().unwrap_or(usual),
+        None if variable.attributes.0.contains_key(name) => f64::NAN,
+        None => usual,
     }
 }
 
@@ -315,6 +337,22 @@ mod tests {
         ];
         attributes.extend_from_slice(range);
         Packing::of(&variable(SHORT, &attributes))
+    }
+
+    #[test]
+    fn packing_that_is_written_as_text_counts_and_what_is_no_number_is_no_packing() {
+        let told = |name: &str, text: &str| {
+            let mut shorts = variable(SHORT, &[]);
+            let text = AttributeValue::Text(text.to_owned());
+            shorts.attributes.0.insert(name.to_owned(), text);
+            Packing::of(&shorts)
+        };
+        assert_eq!(told("scale_factor", "0.5").value(3.0), 1.5);
+        assert_eq!(told("add_offset", " 20").value(3.0), 23.0);
+        assert!(told("missing_value", "-999, -998").value(-998.0).is_nan());
+        assert!(told("scale_factor", "see the manual").scale.is_nan());
+        assert!(told("add_offset", "none").offset.is_nan());
+        assert_eq!(told("scale_factor", "").value(3.0), 3.0);
     }
 
     /// Halves are 8 apart there: -9999 is stored as -10000.
