@@ -78,7 +78,7 @@ test: checkout test-tools $(viewer) ## Everything that CI runs
 	cargo fmt --all --check
 	$(FLUXGLOBE_TOOLS)/bin/typos
 	cd tile-server/web && npm run check && npm test
-	cargo build --locked --workspace --all-targets
+	cargo build --locked --workspace --lib --bins --tests
 	deploy/services/services.sh install
 	rm -f $(not_run)
 	fluxengine=$$(tests/data/fetch.sh) && FLUXGLOBE_FLUXENGINE=$$fluxengine FLUXGLOBE_SKIPPED=$(not_run) \
@@ -87,7 +87,7 @@ test: checkout test-tools $(viewer) ## Everything that CI runs
 	deploy/check.sh
 
 faults: checkout test-tools $(viewer) ## kill -9 of every kind of process, 60 times, while granules land and tiles are drawn
-	cargo build --locked --workspace --all-targets
+	cargo build --locked --workspace --lib --bins --tests
 	deploy/services/services.sh install
 	FLUXGLOBE_KILLS=60 cargo test --locked -p tests --test cluster killed -- --nocapture
 

@@ -196,7 +196,7 @@ mod tests {
             chain(150, once),
             chain(7, twice),
             "WITH a AS (SELECT 1 AS x) SELECT a.x, a.x, a.x FROM a".to_owned(),
-            format!("SELECT {} FROM t", ["f(a)"; 1500].join(", ")),
+            format!("SELECT {} FROM t", vec!["f(a)"; 1500].join(", ")),
             format!(
                 "SELECT {} FROM t",
                 ["(SELECT max(a) FROM t)"; 150].join(", ")
