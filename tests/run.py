@@ -3,9 +3,9 @@
 
     tests/run.py [SUITE...]         suites by name, such as `kafka-log/it` or `tests/cluster`; all of them if none is named
 
-Everything must have been built: `cargo build --workspace --lib --bins --tests`; examples are checked with the lints. Suites that mostly wait, for servers or for
-processes that were killed, go one after the other beside those that compute; lints take what time both leave. What a suite
-says is shown when it ends. A suite that fails hides no other.
+Everything must have been built: `cargo build --workspace --lib --bins --tests`; examples are checked with the lints. Suites
+that mostly wait, for servers or for processes that were killed, go one after the other beside those that compute; lints take
+what time both leave. What a suite says is shown when it ends. A suite that fails hides no other.
 """
 
 import contextlib

@@ -159,8 +159,9 @@ mod tests {
 
     /// Queries each of which reads the one before so.
     fn chain(count: usize, step: impl Fn(usize) -> String) -> String {
-        let steps: String = (0..count).map(|at| format!(", {}", step(at))).collect();
-        format!("WITH t0 AS (SELECT 1 AS a){steps} SELECT count(*) FROM t{count}")
+        let first = "t0 AS (SELECT 1 AS a)".to_owned();
+        let steps: Vec<String> = std::iter::once(first).chain((0..count).map(step)).collect();
+        format!("WITH {} SELECT count(*) FROM t{count}", steps.join(", "))
     }
 
     #[test]
