@@ -5272,7 +5272,8 @@ export interface operations {
                 /** @description How far a kilogram of accumulated carbon a square metre lifts particles, m m² kg⁻¹. */
                 height_exaggeration?: number;
                 /**
-                 * @description Where the light comes from: `AZIMUTH,ELEVATION` in degrees, or `time` for where the sun stood at the instant shown.
+                 * @description Where the light comes from: `AZIMUTH,ELEVATION` in degrees, 5 to 90 high, or `time` for where the sun stood at the instant
+                 *     shown. Particles of map tiles are lit as by a sun no lower than 20 degrees.
                  * @example 315,40
                  */
                 sun?: string;
@@ -5678,7 +5679,8 @@ export interface operations {
                 /** @description How far a kilogram of accumulated carbon a square metre lifts particles, m m² kg⁻¹. */
                 height_exaggeration?: number;
                 /**
-                 * @description Where the light comes from: `AZIMUTH,ELEVATION` in degrees, or `time` for where the sun stood at the instant shown.
+                 * @description Where the light comes from: `AZIMUTH,ELEVATION` in degrees, 5 to 90 high, or `time` for where the sun stood at the instant
+                 *     shown. Particles of map tiles are lit as by a sun no lower than 20 degrees.
                  * @example 315,40
                  */
                 sun?: string;
@@ -5846,7 +5848,8 @@ export interface operations {
                 /** @description How far a kilogram of accumulated carbon a square metre lifts particles, m m² kg⁻¹. */
                 height_exaggeration?: number;
                 /**
-                 * @description Where the light comes from: `AZIMUTH,ELEVATION` in degrees, or `time` for where the sun stood at the instant shown.
+                 * @description Where the light comes from: `AZIMUTH,ELEVATION` in degrees, 5 to 90 high, or `time` for where the sun stood at the instant
+                 *     shown. Particles of map tiles are lit as by a sun no lower than 20 degrees.
                  * @example 315,40
                  */
                 sun?: string;
