@@ -109,7 +109,7 @@ def main():
     unknown = [name for name in [*wanted, *WAITING] if name not in found]
     if unknown:
         sys.exit(f"no such suite: {', '.join(unknown)}; there are {', '.join(sorted(found))}")
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, end_all)
     results = []
     lanes = [

@@ -125,8 +125,8 @@ async fn take(
     shared: &mut Shared,
     gathered: &mut Gathered,
 ) -> Result<(), Stop> {
+    let packing = Packing::of(measured.variable).checked(measured.variable)?;
     let stored = read_stored(session, measured.variable).await?;
-    let packing = Packing::of(measured.variable);
     let lens: Vec<usize> = measured
         .variable
         .dimensions

@@ -13,7 +13,7 @@ pub(crate) const MAX_VALUES: u64 = 1 << 24;
 /// All values of a variable, unpacked, NaN where there is none, in the order of its dimensions.
 pub(super) async fn read(session: &mut Session, variable: &Variable) -> Result<Vec<f64>, Stop> {
     let stored = read_stored(session, variable).await?;
-    let packing = Packing::of(variable);
+    let packing = Packing::of(variable).checked(variable)?;
     Ok(stored.into_iter().map(|v| packing.value(v)).collect())
 }
 

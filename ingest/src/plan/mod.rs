@@ -244,7 +244,7 @@ impl Planning<'_> {
             return Err(Rejection::new(RejectReason::Grid, name, detail).into());
         }
         let parts = vec![Part::All; variable.dimensions.len()];
-        let packing = Packing::of(variable);
+        let packing = Packing::of(variable).checked(variable)?;
         let stored = self.values.read(name, &parts, count).await?;
         Ok(stored.into_iter().map(|v| packing.value(v)).collect())
     }

@@ -18,7 +18,9 @@ use crate::plan::profile::Profile;
 /// 6: composites of days end with their year, a stated length and the coverage of one step must agree, coverage ends after the month or
 ///    year that it names, numbers in units are decimal, codes of floating point are held to what values can hold, cells that nobody wrote
 ///    hold no data beside a `missing_value` too, and when a forecast was begun is no time of its values.
-pub(crate) const DECODER: u32 = 6;
+/// 7: scales, offsets and fill values count that are written as text, what is made of synthetic products is synthetic, and notes tell how
+///    far before the poles a grid ends whose latitudes are evened.
+pub(crate) const DECODER: u32 = 7;
 
 /// How a file was read.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]

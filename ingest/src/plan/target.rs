@@ -233,14 +233,7 @@ pub(crate) fn packing(
             packing = packing.with_valid_values(low, high);
         }
     }
-    if !packing.scale.is_finite() || packing.scale == 0.0 || !packing.offset.is_finite() {
-        let (scale, offset) = (packing.scale, packing.offset);
-        let detail = format!(
-            "has scale_factor {scale} and add_offset {offset}, which cannot be; state them in a profile"
-        );
-        return Err(Rejection::new(RejectReason::Values, &variable.name, detail));
-    }
-    Ok(packing)
+    packing.checked(variable)
 }
 
 #[cfg(test)]

@@ -37,6 +37,8 @@ pub struct LiveService {
     /// Versions after which tiles were ordered, or which were there before anything was heard. A version that viewers are
     /// told of when the log is back may have its event still to come.
     ordered: BTreeMap<ProductId, Version>,
+    /// What there was before anything was heard was looked at once: what is new in an empty list is new.
+    has_begun: bool,
 }
 
 impl LiveService {
@@ -46,6 +48,7 @@ impl LiveService {
             log,
             seen: BTreeMap::new(),
             ordered: BTreeMap::new(),
+            has_begun: false,
         }
     }
 
@@ -77,7 +80,8 @@ impl LiveService {
     }
 
     async fn follow(&mut self) -> Result<(), StorageError> {
-        if self.seen.is_empty() {
+        if !self.has_begun {
+            self.has_begun = true;
             self.remember_all().await;
         }
         let topics = [
@@ -126,7 +130,9 @@ impl LiveService {
                 let Some(touched) = self.new_version(event, manifest).await? else {
                     return Ok(());
                 };
-                self.redraw(event, derived_from, &touched).await
+                self.redraw(event, derived_from, &touched).await?;
+                // A northward part that was computed drifts the particles of its eastward one.
+                self.drift(event, manifest, &touched).await
             }
             Body::RenderDone {
                 key, failure: None, ..

@@ -25,6 +25,12 @@ const LIMIT: Duration = Duration::from_secs(20);
 /// Topics that a server follows.
 const TOPICS: usize = 3;
 
+/// What is told of a file that landed.
+fn landing(manifest: ManifestId) -> Body {
+    let (path, sha256) = ("a.nc".to_owned(), Digest::of(b"a"));
+    Body::granule_landed(path, sha256, manifest, &[], true)
+}
+
 struct Live {
     app: TestApp,
     log: Arc<Log>,
@@ -78,15 +84,7 @@ impl Live {
     }
 
     async fn landed(&self, manifest: &ManifestId) {
-        let (path, sha256) = ("a.nc".to_owned(), Digest::of(b"a"));
-        self.say(Body::granule_landed(
-            path,
-            sha256,
-            manifest.clone(),
-            &[],
-            true,
-        ))
-        .await;
+        self.say(landing(manifest.clone())).await;
     }
 
     async fn orders(&self) -> Vec<(Event, RenderJob)> {
@@ -381,6 +379,20 @@ async fn without_a_log_what_another_process_lands_is_told_all_the_same() {
 
 #[tokio::test]
 async fn a_new_northward_part_is_news_of_the_flow_whose_hot_tiles_are_ordered() {
+    a_northward_part_is_news_of_the_flow(|northward, _flux| landing(northward)).await;
+}
+
+#[tokio::test]
+async fn a_northward_part_that_was_computed_is_news_of_the_flow_too() {
+    a_northward_part_is_news_of_the_flow(|northward, flux| Body::ProductDerived {
+        manifest: northward,
+        derived_from: flux,
+    })
+    .await;
+}
+
+/// `told` is how the event log tells of a version of a northward part; another version is at hand.
+async fn a_northward_part_is_news_of_the_flow(told: impl Fn(ManifestId, ManifestId) -> Body) {
     let live = Live::new().await;
     for part in ["sea-east", "sea-north"] {
         let id = live.app.land(part, Quantity::Current, 1).await;
@@ -394,7 +406,9 @@ async fn a_new_northward_part_is_news_of_the_flow_whose_hot_tiles_are_ordered() 
         .app
         .land_last_month("sea-north", Quantity::Current, 2, None)
         .await;
-    live.landed(&new).await;
+    let flux = manifests::latest(&live.app.store, &"flux".parse().unwrap()).await;
+    live.say(told(new.clone(), flux.unwrap().unwrap().id()))
+        .await;
     while viewer.next().await.unwrap().data["manifest"] != new.to_string() {}
     let told = viewer.next().await.unwrap().data;
     let manifest = told["manifest"].as_str().unwrap();

@@ -4,14 +4,18 @@
 //! and offset unpack to and wider than the stored one; then of values (NetCDF Users Guide, attribute conventions;
 //! CF 1.11, 2.5.1 and 8.1).
 
+use contract::event::RejectReason;
 use cube::foreign::ArrayKind;
 use serde::{Deserialize, Serialize};
 
+use crate::error::Rejection;
 use crate::inspect::file::description::{Attributes, Kind, NumberBits, Variable};
 
 /// From here on floating-point numbers are NetCDF's default fill values (9.97e36), or the 1e35 of older programs.
 const DEFAULT_FILL_FLOAT: f64 = 1e34;
 const ANY: Range = (f64::NEG_INFINITY, f64::INFINITY);
+/// The attributes that make values of stored numbers.
+const SCALES: [&str; 2] = ["scale_factor", "add_offset"];
 
 /// Lowest and highest number that is valid.
 type Range = (f64, f64);
@@ -144,6 +148,21 @@ impl Packing {
         packing
     }
 
+    /// This, if values can be had by it.
+    ///
+    /// # Errors
+    /// `Values` if the scale is zero, or scale or offset are no finite number.
+    pub(crate) fn checked(self, variable: &Variable) -> Result<Self, Rejection> {
+        let (scale, offset) = (self.scale, self.offset);
+        if scale.is_finite() && scale != 0.0 && offset.is_finite() {
+            return Ok(self);
+        }
+        let detail = format!(
+            "has scale_factor {scale} and add_offset {offset}, which cannot be; correct them in the file, or state them in a profile where it is a grid"
+        );
+        Err(Rejection::new(RejectReason::Values, &variable.name, detail))
+    }
+
     /// Only these values (unpacked, in the file's unit) are valid, whatever the file says.
     pub(crate) fn with_valid_values(mut self, low: f64, high: f64) -> Self {
         self.valid_stored = ANY;
@@ -218,11 +237,12 @@ impl Packing {
     }
 }
 
-/// The numbers of an attribute, or of its text, which some writers give in their place.
+/// The numbers of an attribute, or of its text, which some writers give in their place: blanks lie between them, or commas with blanks. A
+/// comma within a word may be a decimal one, and no such text is read.
 fn numbers(variable: &Variable, name: &str) -> Option<Vec<f64>> {
     let of_text = || -> Option<Vec<f64>> {
-        let text = variable.attributes.text(name)?;
-        let words = text.split([' ', ',']).filter(|word| !word.is_empty());
+        let words = variable.attributes.text(name)?.split_whitespace();
+        let words = words.map(|word| word.strip_suffix(',').unwrap_or(word));
         words.map(|word| word.parse().ok()).collect()
     };
     let own = variable.attributes.numbers(name);
@@ -230,10 +250,12 @@ fn numbers(variable: &Variable, name: &str) -> Option<Vec<f64>> {
     own.or_else(|| variable.is_numeric().then(of_text).flatten())
 }
 
-/// The number of an attribute, `usual` if it is not there. Of text that is no number NaN, which planning refuses: values would be
-/// taken as they are packed.
+/// The number of an attribute, `usual` if it is not there. Of text that is not one number NaN, which [`Packing::checked`] refuses: values
+/// would be taken as they are packed.
 fn number(variable: &Variable, name: &str, usual: f64) -> f64 {
+    let is_text = variable.attributes.text(name).is_some();
     match numbers(variable, name) {
+        Some(all) if is_text && all.len() > 1 => f64::NAN,
         Some(all) => all.first().copied().unwrap_or(usual),
         None if variable.attributes.0.contains_key(name) => f64::NAN,
         None => usual,
@@ -255,6 +277,10 @@ fn speaks(variable: &Variable, name: &str, number: f64) -> Speaks {
         return Speaks::OfStored;
     };
     let is_float = |kind| matches!(kind, Kind::Float(_));
+    // A text has no type of its own: what is no type of stored integers is that of values.
+    if is_scaled_by_text(attributes) && is_float(kind) && !is_float(variable.kind) {
+        return Speaks::OfValues;
+    }
     if kind == unpacked && width(unpacked) > width(variable.kind) {
         return Speaks::OfValues;
     }
@@ -274,9 +300,21 @@ fn speaks(variable: &Variable, name: &str, number: f64) -> Speaks {
     Speaks::Unclear
 }
 
-/// The type that scale and offset unpack to: the wider of theirs.
+fn is_scaled_by_text(attributes: &Attributes) -> bool {
+    let is_text = |name: &str| {
+        attributes
+            .text(name)
+            .is_some_and(|text| !text.trim().is_empty())
+    };
+    SCALES.into_iter().any(is_text)
+}
+
+/// The type that scale and offset unpack to: the wider of theirs. Their text is read in double precision.
 fn unpacked_kind(attributes: &Attributes) -> Option<Kind> {
-    let kinds = ["scale_factor", "add_offset"].map(|name| attributes.kind(name));
+    if is_scaled_by_text(attributes) {
+        return Some(Kind::Float(8));
+    }
+    let kinds = SCALES.map(|name| attributes.kind(name));
     kinds.into_iter().flatten().max_by_key(|kind| width(*kind))
 }
 
@@ -353,6 +391,31 @@ mod tests {
         assert!(told("scale_factor", "see the manual").scale.is_nan());
         assert!(told("add_offset", "none").offset.is_nan());
         assert_eq!(told("scale_factor", "").value(3.0), 3.0);
+        // A decimal comma is none between numbers.
+        for (name, text) in [("add_offset", "273,15"), ("scale_factor", "1, 5")] {
+            let packing = told(name, text);
+            assert!(packing.checked(&variable(SHORT, &[])).is_err(), "{text}");
+        }
+        assert_eq!(told("_FillValue", "-999,0").value(0.0), 0.0);
+        assert!(
+            told("add_offset", "273.15")
+                .checked(&variable(SHORT, &[]))
+                .is_ok()
+        );
+        // Bounds of values are known by their type, whatever type the scale is written in.
+        let bounds = [
+            ("valid_min", FLOAT, &[-1.0][..]),
+            ("valid_max", FLOAT, &[40.0]),
+        ];
+        let mut shorts = variable(SHORT, &bounds);
+        let scale = AttributeValue::Text("0.01".to_owned());
+        shorts.attributes.0.insert("scale_factor".to_owned(), scale);
+        let packing = Packing::of(&shorts);
+        assert_eq!(
+            (packing.value(2500.0), packing.assumption.as_ref()),
+            (25.0, None)
+        );
+        assert!(packing.value(4100.0).is_nan());
     }
 
     /// Halves are 8 apart there: -9999 is stored as -10000.
