@@ -1,7 +1,7 @@
 //! How deep what is asked would be: the text of a question or an expression in; a refusal out where what reads, plans and answers it would need
 //! more of a thread's stack than there is.
 //!
-//! The parser counts brackets in brackets. What stands in a chain (`a + b + c`, `a OR b OR c`, tables that are joined, queries that read the one
+//! The parser counts brackets in most brackets, but for types, patterns and EXPLAIN. What stands in a chain (`a + b + c`, `a OR b OR c`, tables that are joined, queries that read the one
 //! before) has no brackets and is as deep: a thread whose stack overflows ends the process, with all that others asked of it.
 
 use datafusion::sql::sqlparser::dialect::GenericDialect;
@@ -12,6 +12,13 @@ use datafusion::sql::sqlparser::tokenizer::{Token, Tokenizer};
 const MAX_OPERATORS: usize = 500;
 /// Most queries, joins and tables: 500 that read each other are planned, 800 overflow the same stack.
 const MAX_QUERIES: usize = 200;
+/// Most brackets one in another; the parser itself takes 50 of expressions.
+const MAX_BRACKETS: usize = 100;
+/// Most brackets one in another after words that the parser reads in two ways or four, one after the other: each doubles or quadruples the time
+/// of a text that it cannot read. 14 of POSITION take 6 s.
+const MAX_TRIED: usize = 10;
+/// Most EXPLAINs: the planner takes one, and 700 overflow a thread's stack before it is asked.
+const MAX_EXPLAINS: usize = 8;
 
 /// Refuses a text that would be too deep, with the reason. One that cannot be cut into words is left to the parser, which says why.
 pub(crate) fn check(text: &str) -> Result<(), String> {
@@ -25,12 +32,18 @@ pub(crate) fn check(text: &str) -> Result<(), String> {
     for token in &tokens {
         depths.take(token);
     }
+    if depths.is_endless {
+        return Err(format!(
+            "it has more than {MAX_BRACKETS} brackets one in another, {MAX_TRIED} of CAST, POSITION and the like, or {MAX_EXPLAINS} EXPLAIN, or an \
+             INTERVAL of an INTERVAL: ask in parts"
+        ));
+    }
     if depths.query_count > MAX_QUERIES {
         return Err(format!(
             "it has more than {MAX_QUERIES} queries, joins and tables: ask for fewer at a time"
         ));
     }
-    if depths.deepest.iter().sum::<usize>() > MAX_OPERATORS {
+    if depths.most_operators() > MAX_OPERATORS {
         return Err(format!(
             "it has more than {MAX_OPERATORS} operators one in another: give values as IN (...), or ask in parts"
         ));
@@ -52,6 +65,12 @@ struct Level {
     is_from: bool,
     /// Does it name a type, whose commas end no expression?
     has_type: bool,
+    /// Brackets around it of what the parser reads in several ways.
+    tried: usize,
+    /// The first query of the branch of a UNION that is being read.
+    branch: Option<usize>,
+    /// Operators of the branch before that has most: branches are beside each other.
+    widest: usize,
 }
 
 /// What was read so far.
@@ -64,16 +83,32 @@ struct Depths {
     query_count: usize,
     /// Words of IS DISTINCT FROM that were just read: no tables come after that.
     compared: usize,
+    /// The word before, if nothing else came since.
+    last: Option<Keyword>,
+    explain_count: usize,
+    /// Would it take the parser more stack or time than there is?
+    is_endless: bool,
 }
 
 impl Depths {
     fn take(&mut self, token: &Token) {
+        let last = self.last;
+        if !matches!(token, Token::Whitespace(_)) {
+            self.last = match token {
+                Token::Word(word) => Some(word.keyword),
+                _ => None,
+            };
+        }
         match token {
-            Token::Word(word) => self.word(word.keyword),
-            Token::LParen | Token::LBrace => self.open(false),
+            Token::Word(word) => {
+                self.is_endless |=
+                    word.keyword == Keyword::INTERVAL && last == Some(Keyword::INTERVAL);
+                self.word(word.keyword);
+            }
+            Token::LParen | Token::LBrace => self.open_after(last),
             Token::LBracket => {
                 self.operator();
-                self.open(false);
+                self.open_after(last);
             }
             Token::RParen | Token::RBrace | Token::RBracket => self.close(),
             Token::Comma => {
@@ -101,20 +136,19 @@ impl Depths {
         match keyword {
             Keyword::SELECT => {
                 self.query_count += 1;
-                self.deepest.push(0);
-                self.now = Level {
-                    query: self.deepest.len() - 1,
-                    is_case: self.now.is_case,
-                    ..Level::default()
-                };
+                self.begin_query();
             }
-            Keyword::VALUES
-            | Keyword::JOIN
-            | Keyword::UNION
-            | Keyword::EXCEPT
-            | Keyword::INTERSECT
-            | Keyword::PIVOT
-            | Keyword::UNPIVOT => self.query_count += 1,
+            Keyword::UNION | Keyword::EXCEPT | Keyword::INTERSECT => {
+                self.query_count += 1;
+                self.end_branch();
+            }
+            Keyword::EXPLAIN | Keyword::DESCRIBE => {
+                self.explain_count += 1;
+                self.is_endless |= self.explain_count > MAX_EXPLAINS;
+            }
+            Keyword::VALUES | Keyword::JOIN | Keyword::PIVOT | Keyword::UNPIVOT => {
+                self.query_count += 1
+            }
             Keyword::FROM => self.now.is_from |= self.compared != 3,
             Keyword::GROUP | Keyword::ORDER | Keyword::LIMIT => self.now.is_from = false,
             Keyword::WHERE | Keyword::HAVING => {
@@ -133,6 +167,42 @@ impl Depths {
         }
     }
 
+    fn begin_query(&mut self) {
+        self.deepest.push(0);
+        let query = self.deepest.len() - 1;
+        self.now = Level {
+            query,
+            is_case: self.now.is_case,
+            tried: self.now.tried,
+            branch: Some(self.now.branch.unwrap_or(query)),
+            widest: self.now.widest,
+            ..Level::default()
+        };
+    }
+
+    /// What comes next is beside the branch before, not within. Queries of WITH, which stand before the first SELECT, are of all branches.
+    fn end_branch(&mut self) {
+        if let Some(start) = self.now.branch.take() {
+            self.now.widest = self.widest_since(start);
+            self.deepest.truncate(start);
+        }
+        self.begin_query();
+    }
+
+    /// Operators of the branch of this level that has most, the one that began there among them.
+    fn widest_since(&self, start: usize) -> usize {
+        self.now.widest.max(self.deepest[start..].iter().sum())
+    }
+
+    /// Operators that may come to stand one in another.
+    fn most_operators(mut self) -> usize {
+        while !self.outer.is_empty() {
+            self.leave();
+        }
+        let start = self.now.branch.unwrap_or(self.deepest.len());
+        self.deepest[..start].iter().sum::<usize>() + self.widest_since(start)
+    }
+
     fn operator(&mut self) {
         self.now.depth += 1;
         let deepest = &mut self.deepest[self.now.query];
@@ -145,13 +215,21 @@ impl Depths {
         }
     }
 
+    fn open_after(&mut self, word: Option<Keyword>) {
+        self.open(false);
+        self.now.tried += usize::from(word.is_some_and(is_tried));
+        self.is_endless |= self.now.tried > MAX_TRIED;
+    }
+
     fn open(&mut self, is_case: bool) {
         self.outer.push(self.now);
+        self.is_endless |= self.outer.len() > MAX_BRACKETS;
         self.now = Level {
             query: self.now.query,
             around: self.now.depth,
             depth: self.now.depth,
             is_case,
+            tried: self.now.tried,
             ..Level::default()
         };
     }
@@ -165,8 +243,38 @@ impl Depths {
     }
 
     fn leave(&mut self) {
-        self.now = self.outer.pop().unwrap_or(self.now);
+        let Some(outer) = self.outer.pop() else {
+            return;
+        };
+        if let Some(start) = self.now.branch {
+            let all = self.widest_since(start);
+            self.deepest.truncate(start);
+            self.deepest.push(all);
+        }
+        self.now = outer;
     }
+}
+
+/// Does the parser read what stands in brackets after a word in one way after the other?
+fn is_tried(word: Keyword) -> bool {
+    matches!(
+        word,
+        Keyword::CAST
+            | Keyword::TRY_CAST
+            | Keyword::SAFE_CAST
+            | Keyword::CONVERT
+            | Keyword::TRY_CONVERT
+            | Keyword::POSITION
+            | Keyword::SUBSTRING
+            | Keyword::SUBSTR
+            | Keyword::OVERLAY
+            | Keyword::CEIL
+            | Keyword::FLOOR
+            | Keyword::EXTRACT
+            | Keyword::TRIM
+            | Keyword::ARRAY
+            | Keyword::INTERVAL
+    )
 }
 
 /// Is a word an operator, as the parser has them?
@@ -239,6 +347,33 @@ mod tests {
             format!("WITH {} SELECT 1", many(2000, chained, ", ")),
             format!("WITH {} SELECT 1", many(60, sums, ", ")),
             format!("SELECT ({}) + 1", many(2000, |_| "1".into(), " - ")),
+            format!("SELECT {}1{}", "(".repeat(3000), ")".repeat(3000)),
+            format!("{}SELECT 1", "EXPLAIN ".repeat(700)),
+            format!("SELECT {}'1' DAY", "INTERVAL ".repeat(400)),
+            format!(
+                "SELECT CAST(1 AS {}INT{})",
+                "NULLABLE(".repeat(1600),
+                ")".repeat(1600)
+            ),
+            format!(
+                "SELECT 1 FROM t MATCH_RECOGNIZE(PATTERN({}a",
+                "(".repeat(3000)
+            ),
+            // Each of these doubles the time that the parser takes to say what is wrong.
+            format!("SELECT {}1{}", "CAST(".repeat(20), " AS)".repeat(20)),
+            format!("SELECT {}{}", "position(".repeat(20), " )(*".repeat(20)),
+            format!("SELECT {}1", "ARRAY[".repeat(20)),
+            // Of a UNION the largest branch counts, with what stands in a WITH before.
+            format!(
+                "WITH c AS (SELECT 1{}) SELECT a{} FROM c UNION SELECT 1 FROM c",
+                " + 1".repeat(300),
+                " + 1".repeat(300)
+            ),
+            format!(
+                "WITH c AS (SELECT 1{}) SELECT 1 FROM c UNION (SELECT a{} FROM (SELECT 2) UNION SELECT 1 FROM c)",
+                " + 1".repeat(300),
+                " + 1".repeat(300)
+            ),
         ] {
             let start: String = text.chars().take(60).collect();
             assert!(check(&text).is_err(), "{start}");
@@ -268,7 +403,19 @@ mod tests {
                 |at| format!("SELECT a - b FROM t{at} WHERE a > 1"),
                 " UNION ALL ",
             ),
-            format!("SELECT {}1{}", "(".repeat(3000), ")".repeat(3000)),
+            many(
+                50,
+                |at| {
+                    format!(
+                        "SELECT 'p{at}', avg(v) FROM p{at} WHERE a > 1 AND b < 2 AND c >= 3 AND d <= 4 AND e <> 5 AND f = 6"
+                    )
+                },
+                " UNION ALL ",
+            ),
+            "SELECT 1) UNION SELECT 2".to_owned(),
+            format!("SELECT {}1{}", "CAST(".repeat(8), " AS INT)".repeat(8)),
+            "EXPLAIN SELECT INTERVAL '1' DAY + INTERVAL '2' DAY".to_owned(),
+            format!("SELECT {}1{}", "(".repeat(40), ")".repeat(40)),
             format!("SELECT a IS NOT DISTINCT FROM b{}", ", c".repeat(1000)),
             "SELECT 'it ends nowhere".to_owned(),
         ] {

@@ -83,18 +83,32 @@ impl<'n> TreeNodeVisitor<'n> for Growth {
     fn f_up(&mut self, node: &'n LogicalPlan) -> Result<TreeNodeRecursion, DataFusionError> {
         let below = self.open.pop();
         let below = below.map_or(1.0, |below| below.inputs * below.within);
-        let own = match node {
+        let made = match node {
             // What grows in one turn grows in each.
             LogicalPlan::RecursiveQuery(_) if below > 1.0 => f64::INFINITY,
             _ => below * of_node(node)?,
         };
+        self.all = self.all.max(made);
+        let own = if hands_on(node) { below } else { made };
         match (self.open.last_mut(), node) {
             (Some(above), LogicalPlan::Subquery(_)) => above.within *= own,
             (Some(above), _) => above.inputs = above.inputs.max(own),
-            (None, _) => self.all = own,
+            (None, _) => {}
         }
         Ok(TreeNodeRecursion::Continue)
     }
+}
+
+/// Does a node hand on what it reads as it is, whatever it computes to choose or to order it?
+fn hands_on(node: &LogicalPlan) -> bool {
+    matches!(
+        node,
+        LogicalPlan::Filter(_)
+            | LogicalPlan::Sort(_)
+            | LogicalPlan::Join(_)
+            | LogicalPlan::Limit(_)
+            | LogicalPlan::SubqueryAlias(_)
+    )
 }
 
 /// The most that an expression of a node makes of what the node reads.

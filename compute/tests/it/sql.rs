@@ -540,6 +540,20 @@ async fn texts_are_joined_and_those_that_would_double_without_end_are_refused() 
         ["SELECT x || 'b' || x AS x FROM (VALUES ('c')) AS t(x)"; 30].join(" UNION ALL ");
     let count = format!("SELECT count(x) FROM ({branches})");
     assert_eq!(one(&sql, &count).await, "30");
+    // What is compared is as long as it was.
+    let chosen = |at: usize| {
+        format!(
+            ", t{} AS (SELECT * FROM t{at} WHERE a || ':' || a <> 'q' AND a || a <> 'z' AND a <> 'y')",
+            at + 1
+        )
+    };
+    let chosen: String = (0..8).map(chosen).collect();
+    let chosen = format!(
+        "WITH t0 AS (SELECT * FROM (VALUES ('a'), ('b')) AS t(a)){chosen} SELECT count(*) FROM t8"
+    );
+    assert_eq!(one(&sql, &chosen).await, "2");
+    let months = "WITH RECURSIVE months AS (SELECT 1 AS m UNION ALL SELECT m + 1 FROM months WHERE concat(m, '-', m) <> '12-12') SELECT count(*) FROM months";
+    assert_eq!(one(&sql, months).await, "12");
     for endless in [
         "WITH RECURSIVE t AS (SELECT 'ab' AS x UNION ALL SELECT x || x FROM t) SELECT max(x) FROM t",
         "SELECT length((SELECT string_agg(x || x, ',') FROM (SELECT string_agg(x || x, ',') AS x FROM (VALUES ('a')) AS t(x)) AS u))",
@@ -567,7 +581,37 @@ async fn a_condition_that_doubles_where_columns_are_written_out_is_refused() {
     assert_eq!(one(&sql, &computed_of_computed(40, "a + 0")).await, "1");
     let doubling = computed_of_computed(40, "a + a");
     let within = format!("SELECT (SELECT max(n) FROM ({doubling}) AS s(n))");
-    for text in [doubling, within] {
+    let between = computed_of_computed(30, "(a BETWEEN 0 AND 1)::int");
+    let listed = computed_of_computed(30, "(a IN (0, 1))::int");
+    let of_one = "FROM (VALUES (1), (2)) AS v(a)";
+    let nested = |before: &str, after: &str| {
+        format!("SELECT {}a{} {of_one}", before.repeat(20), after.repeat(20))
+    };
+    let compared = nested("(", " BETWEEN 0 AND 1)::int");
+    let filled = nested("ifnull(", ", 0)");
+    // Nothing is written out where no condition asks for it.
+    let class = |of: &str| {
+        let branch = |at: usize| format!("WHEN {of} >= {at} AND {of} < {at} + 1 THEN {at}");
+        let branches: Vec<String> = (0..40).map(branch).collect();
+        format!("CASE {} ELSE -1 END", branches.join(" "))
+    };
+    let classes = |more: &str| {
+        let (first, next) = (class("a"), class("b"));
+        format!(
+            "SELECT count(c) FROM (SELECT {} AS c FROM (SELECT {next} AS d FROM (SELECT {first} AS b {of_one}))) {more}",
+            class("d")
+        )
+    };
+    assert_eq!(one(&sql, &classes("")).await, "2");
+    for text in [
+        doubling,
+        within,
+        between,
+        listed,
+        compared,
+        filled,
+        classes("WHERE c > 1"),
+    ] {
         let error = ask(&sql, &text).await.unwrap_err().to_string();
         assert!(error.contains("written out"), "{error}");
     }
