@@ -147,7 +147,7 @@ impl Depths {
                 self.is_endless |= self.explain_count > MAX_EXPLAINS;
             }
             Keyword::VALUES | Keyword::JOIN | Keyword::PIVOT | Keyword::UNPIVOT => {
-                self.query_count += 1
+                self.query_count += 1;
             }
             Keyword::FROM => self.now.is_from |= self.compared != 3,
             Keyword::GROUP | Keyword::ORDER | Keyword::LIMIT => self.now.is_from = false,

@@ -56,7 +56,7 @@ async fn attributes_of_any_size_and_number_are_bounded_and_their_file_lands() {
 
 /// In the newest format, whose headers and blocks have checksums, a file of one dataset with more attributes than its header holds.
 /// One byte of the last block of a kind is another.
-fn damaged(place: &Place, kind: &[u8; 4]) -> std::path::PathBuf {
+fn damaged(place: &Place, kind: [u8; 4]) -> std::path::PathBuf {
     let path = place.path("damaged.h5");
     let file = hdf5::File::with_options()
         .with_fapl(hdf5::plist::FileAccessBuilder::libver_latest)
@@ -71,7 +71,7 @@ fn damaged(place: &Place, kind: &[u8; 4]) -> std::path::PathBuf {
     drop(dataset);
     file.close().unwrap();
     let mut content = std::fs::read(&path).unwrap();
-    let found = content.windows(4).rposition(|bytes| bytes == kind);
+    let found = content.windows(4).rposition(|bytes| *bytes == kind);
     content[found.expect("there is such a block")] ^= 1;
     std::fs::write(&path, content).unwrap();
     path
@@ -80,7 +80,7 @@ fn damaged(place: &Place, kind: &[u8; 4]) -> std::path::PathBuf {
 #[tokio::test]
 async fn damaged_attributes_and_datasets_are_not_taken_for_none() {
     // The block of attributes, and the header of the dataset.
-    for kind in [b"FHDB", b"OHDR"] {
+    for kind in [*b"FHDB", *b"OHDR"] {
         let place = Place::new();
         let path = damaged(&place, kind);
         let (reason, line) = refusal(&place.land(&[path]).await);
