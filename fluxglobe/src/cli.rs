@@ -474,7 +474,7 @@ pub(crate) enum Generate {
         scale: f64,
         #[command(flatten)]
         file: GeneratedFile,
-        /// File to write.
+        /// File to write, which is not there yet. It is whole or not there.
         #[arg(short, long, default_value = "china-sea-synthetic.h5")]
         output: PathBuf,
     },
@@ -487,7 +487,7 @@ pub(crate) enum Generate {
         degrees: f64,
         #[command(flatten)]
         file: GeneratedFile,
-        /// File to write.
+        /// File to write, which is not there yet. It is whole or not there.
         #[arg(short, long, default_value = "globe-synthetic.h5")]
         output: PathBuf,
     },

@@ -68,7 +68,7 @@ def data(options, folder):
     if told.exists():
         return json.loads(told.read_text())["product"]
     tiles.say(f"making {options.years} years of the China Sea")
-    files = tiles.run(options.program, "generate", "china-sea", "--scale", stats.SCALE, "--seed", stats.SEED, "--years", options.years, "--output", folder / "sea.h5").split()
+    files = stats.made(options.program, options.years, folder)
     tiles.say("landing them")
     tiles.run(options.program, "--data", folder / "data", "ingest", *files)
     listed = json.loads(tiles.run(options.program, "--data", folder / "data", "products", "--json"))

@@ -69,6 +69,14 @@ def arguments():
     return parser.parse_args()
 
 
+def made(program, years, folder):
+    """Files of the made-up China Sea, one a year."""
+    # Of a run that was ended before it had landed them: nothing is written over.
+    for left in folder.glob("sea-[0-9][0-9][0-9][0-9].h5"):
+        left.unlink()
+    return tiles.run(program, "generate", "china-sea", "--scale", SCALE, "--seed", SEED, "--years", years, "--output", folder / "sea.h5").split()
+
+
 def data(options, folder):
     """Lands the files here and writes them as Zarr there; how long each took, and what it holds on disk."""
     builds = folder / "builds.json"
@@ -77,7 +85,7 @@ def data(options, folder):
         return told["product"], told["builds"]
     program = options.program
     tiles.say(f"making {options.years} years of the China Sea")
-    files = tiles.run(program, "generate", "china-sea", "--scale", SCALE, "--seed", SEED, "--years", options.years, "--output", folder / "sea.h5").split()
+    files = made(program, options.years, folder)
     tiles.say("landing them")
     begin = time.time()
     tiles.run(program, "--data", folder / "data", "ingest", *files)

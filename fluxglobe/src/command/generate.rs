@@ -36,25 +36,39 @@ pub(crate) fn run(options: Generate) -> Result<()> {
     }
 }
 
-/// Writes the file that is asked for, or one a year, and prints their names.
+/// Writes the file that is asked for, or one a year, and prints their names; nothing if one of them is there.
 fn files(
     asked: GeneratedFile,
     output: &Path,
     write: impl Fn(&Path, GeneratedSteps) -> Result<()>,
 ) -> Result<()> {
-    let Some(count) = asked.years else {
-        let steps = asked
-            .days
-            .map_or(GeneratedSteps::Months, GeneratedSteps::Days);
-        write(output, steps)?;
-        return progress::result(&output.display().to_string());
-    };
-    for year in FIRST_YEAR..FIRST_YEAR + count {
-        let own = of_year(output, year);
-        write(&own, GeneratedSteps::Year(year))?;
+    let all = asked_for(asked, output);
+    // Before the first is written: the last of many years is long after it.
+    for (own, _steps) in &all {
+        ensure!(
+            !own.exists(),
+            "{} is there, and nothing was written: give another --output, or remove it",
+            own.display()
+        );
+    }
+    for (own, steps) in all {
+        write(&own, steps)?;
         progress::result(&own.display().to_string())?;
     }
     Ok(())
+}
+
+/// The files, each with its steps.
+fn asked_for(asked: GeneratedFile, output: &Path) -> Vec<(PathBuf, GeneratedSteps)> {
+    if let Some(count) = asked.years {
+        return (FIRST_YEAR..FIRST_YEAR + count)
+            .map(|year| (of_year(output, year), GeneratedSteps::Year(year)))
+            .collect();
+    }
+    let steps = asked
+        .days
+        .map_or(GeneratedSteps::Months, GeneratedSteps::Days);
+    vec![(output.to_owned(), steps)]
 }
 
 /// `china-sea.h5` and 2010 make `china-sea-2010.h5`.
@@ -93,4 +107,45 @@ fn with_bar(
     })?;
     progress::done(&bar, &format!("SYNTHETIC data in {}", output.display()));
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::cell::RefCell;
+
+    #[test]
+    fn of_many_years_none_is_written_if_one_is_there() {
+        let folder = tempfile::tempdir().unwrap();
+        let output = folder.path().join("sea.h5");
+        let kept = folder.path().join("sea-2011.h5");
+        std::fs::write(&kept, "mine").unwrap();
+        let asked = GeneratedFile {
+            seed: 1,
+            days: None,
+            years: Some(3),
+        };
+        let written = RefCell::new(vec![]);
+        let write = |own: &Path, _steps: GeneratedSteps| {
+            written.borrow_mut().push(own.to_owned());
+            Ok(())
+        };
+        let refused = files(asked, &output, write).unwrap_err().to_string();
+        assert!(refused.contains("sea-2011.h5 is there"), "{refused}");
+        assert!(written.borrow().is_empty(), "{written:?}");
+
+        std::fs::remove_file(&kept).unwrap();
+        files(asked, &output, write).unwrap();
+        let own = [2009, 2010, 2011].map(|year| of_year(&output, year));
+        assert_eq!(*written.borrow(), own);
+
+        let months = GeneratedFile {
+            years: None,
+            ..asked
+        };
+        std::fs::write(&output, "mine").unwrap();
+        let refused = files(months, &output, write).unwrap_err().to_string();
+        assert!(refused.contains("sea.h5 is there"), "{refused}");
+        assert_eq!(written.borrow().len(), 3);
+    }
 }

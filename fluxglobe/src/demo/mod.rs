@@ -109,14 +109,12 @@ async fn synthetic_inputs(store: &Store, cache: &Path) -> Result<Inputs> {
     std::fs::create_dir_all(cache)?;
     let file = cache.join("china-sea-synthetic.h5");
     if !file.exists() {
-        let unfinished = cache.join("china-sea-synthetic.part");
         generate::china_sea(
-            &unfinished,
+            &file,
             SYNTHETIC_SCALE,
             SYNTHETIC_SEED,
             ingest::GeneratedSteps::Months,
         )?;
-        std::fs::rename(&unfinished, &file)?;
     }
     Ok(Inputs {
         flux,

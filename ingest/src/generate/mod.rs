@@ -1,7 +1,7 @@
 //! The generators of synthetic products: a size and a seed in, an HDF5 file out, the same bytes each time.
 //!
 //! The China Sea (12 months of 2009, or days of it) and the whole sea, with coasts, clouds and seasons that look right on a
-//! globe. They are made up: every file says `synthetic = 1`.
+//! globe. They are made up: every file says `synthetic = 1`. A file is whole or not there, and takes the place of nothing.
 
 mod china_sea;
 mod clouds;
@@ -12,7 +12,10 @@ mod product;
 mod steps;
 mod writer;
 
+use std::io::ErrorKind;
 use std::path::Path;
+
+use tempfile::NamedTempFile;
 
 use crate::error::IngestError;
 
@@ -21,10 +24,16 @@ use globe::Globe;
 use product::{KeptMonth, MadeUp};
 pub use steps::GeneratedSteps;
 
+/// Why a file is not written over, which may be the only one of its data.
+const EXISTS: &str = "something is there: give another name, or remove it";
+
 /// Is told of steps done, and of steps in all.
 type Progress<'a> = &'a dyn Fn(usize, usize);
 
 /// Writes the synthetic China Sea product. `scale` is 1 for 1800 x 2460 cells, 0.1 for 180 x 246.
+///
+/// # Errors
+/// It cannot be made so, it cannot be written there, or something is there.
 pub fn generate_china_sea(
     path: &Path,
     scale: f64,
@@ -38,6 +47,9 @@ pub fn generate_china_sea(
 }
 
 /// Writes the synthetic product of the whole sea, in cells of so many degrees, 0.01 to 5.
+///
+/// # Errors
+/// It cannot be made so, it cannot be written there, or something is there.
 pub fn generate_globe(
     path: &Path,
     degrees: f64,
@@ -48,7 +60,7 @@ pub fn generate_globe(
     whole(path, Globe::new(degrees, seed), steps, progress)
 }
 
-/// Writes the file, whole or not at all.
+/// Writes the file, whole or not at all, where nothing is.
 fn whole(
     path: &Path,
     made_up: Result<impl MadeUp, String>,
@@ -63,10 +75,14 @@ fn whole(
     if let Some(refusal) = steps.refusal() {
         return Err(failed(refusal));
     }
+    if path.exists() {
+        return Err(failed(EXISTS.to_owned()));
+    }
     let edges = steps.edges_days();
     let step_count = edges.len() - 1;
     // A reader never sees half a file.
-    let part = path.with_extension("part");
+    let part = part_of(path).map_err(|e| failed(e.to_string()))?;
+    let part = part.into_temp_path();
     let mut kept = KeptMonth::default();
     let texts = (made_up.texts(), steps.title());
     let written = writer::write(&part, made_up.grid(), texts, &edges, |step, rows| {
@@ -74,9 +90,27 @@ fn whole(
         kept.day_values(&made_up, steps.month_and_strength(step), rows)
     });
     written.map_err(|e| failed(e.to_string()))?;
-    std::fs::rename(&part, path).map_err(|e| failed(e.to_string()))?;
+    part.persist_noclobber(path)
+        .map_err(|e| match e.error.kind() {
+            ErrorKind::AlreadyExists => failed(EXISTS.to_owned()),
+            _ => failed(e.error.to_string()),
+        })?;
     progress(step_count, step_count);
     Ok(())
+}
+
+/// An unfinished file beside what it will be, which goes if it is never finished.
+fn part_of(path: &Path) -> std::io::Result<NamedTempFile> {
+    let folder = path.parent().filter(|own| !own.as_os_str().is_empty());
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".generate-");
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt as _;
+        // Like any other file, as far as the user's mask lets it.
+        builder.permissions(std::fs::Permissions::from_mode(0o666));
+    }
+    builder.tempfile_in(folder.unwrap_or(Path::new(".")))
 }
 
 #[cfg(test)]
@@ -113,5 +147,57 @@ mod tests {
         let seven = generate_globe(&path, 7.0, 1, GeneratedSteps::Months, &|_, _| {});
         assert!(seven.unwrap_err().to_string().contains("7 degrees"));
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+    }
+
+    /// Names in a folder, with the bytes of each.
+    fn held(folder: &Path) -> Vec<(std::ffi::OsString, Vec<u8>)> {
+        let entries = std::fs::read_dir(folder).unwrap();
+        let mut held: Vec<_> = entries
+            .map(|entry| {
+                let entry = entry.unwrap();
+                (entry.file_name(), std::fs::read(entry.path()).unwrap())
+            })
+            .collect();
+        held.sort();
+        held
+    }
+
+    #[test]
+    fn a_file_takes_the_place_of_nothing_and_touches_nothing_beside_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("mine.nc");
+        std::fs::write(&path, "a year of measurements").unwrap();
+        std::fs::write(folder.path().join("mine.part"), "a part of them").unwrap();
+        let before = held(folder.path());
+        let made = |path: &Path, told: Progress<'_>| {
+            generate_china_sea(path, 0.02, 1, GeneratedSteps::Days(2), told)
+        };
+        let refused = made(&path, &|_, _| {}).unwrap_err().to_string();
+        assert!(refused.contains("mine.nc"), "{refused}");
+        assert!(refused.contains("something is there"), "{refused}");
+        assert_eq!(held(folder.path()), before);
+        // Nor of what has come while it was made.
+        std::fs::remove_file(&path).unwrap();
+        let comes = |_: usize, _: usize| std::fs::write(&path, "a year of measurements").unwrap();
+        let refused = made(&path, &comes).unwrap_err().to_string();
+        assert!(refused.contains("something is there"), "{refused}");
+        assert_eq!(held(folder.path()), before);
+        // Where nothing is, the file alone comes to be there.
+        std::fs::remove_file(&path).unwrap();
+        made(&path, &|_, _| {}).unwrap();
+        assert_eq!(held(folder.path()).len(), 2);
+    }
+
+    #[test]
+    fn what_ends_in_the_middle_leaves_nothing_behind() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("half.nc");
+        let ended = std::panic::catch_unwind(|| {
+            generate_china_sea(&path, 0.02, 1, GeneratedSteps::Days(2), &|done, _| {
+                assert_eq!(done, 0, "the second step ends it");
+            })
+        });
+        assert!(ended.is_err());
+        assert_eq!(held(folder.path()), []);
     }
 }
