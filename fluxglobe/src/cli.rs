@@ -211,7 +211,7 @@ pub(crate) enum Command {
     Migrate(Migrate),
     /// Remove objects that no kept version needs.
     Gc(Gc),
-    /// Show what would become of files: landed with which profile, or refused and why. Nothing is stored.
+    /// Show what would become of files: landed with which profile, or refused and why. Nothing is stored. Fails where nothing would land.
     Survey(Survey),
     /// List the Vulkan adapters of this machine, and which of them are drawn on.
     Adapters(Adapters),

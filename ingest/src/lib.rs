@@ -47,4 +47,4 @@ pub use pipeline::progress::{Progress, Quiet, Stage};
 pub use plan::profile::{Profile, Profiles, shipped};
 pub use put::reading::Readings;
 pub use settings::{DecoderCommand, Settings};
-pub use survey::{Row, data_files, markdown, survey};
+pub use survey::{DATA_ENDINGS, Row, data_files, markdown, survey};

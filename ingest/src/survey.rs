@@ -19,7 +19,7 @@ use crate::pipeline::progress::Quiet;
 use crate::settings::Settings;
 
 /// Endings of files that may hold data; documentation beside them is passed over.
-const DATA_ENDINGS: [&str; 10] = [
+pub const DATA_ENDINGS: [&str; 10] = [
     "nc", "nc4", "cdf", "h5", "hdf", "hdf5", "csv", "tsv", "tab", "dat",
 ];
 /// Folders below a folder that are looked into.

@@ -45,6 +45,33 @@ fn a_batch_goes_on_past_bad_files_and_its_exit_code_says_so() {
 }
 
 #[test]
+fn a_survey_of_nothing_and_one_in_which_nothing_would_land_fail() {
+    let place = tempfile::tempdir().unwrap();
+    let data = place.path().join("data");
+    let folder = place.path().join("files");
+    std::fs::create_dir(&folder).unwrap();
+    let words = ["survey", folder.to_str().unwrap()];
+
+    std::fs::write(folder.join("README.txt"), "no data").unwrap();
+    let talk = program::fail(&data, &words).unwrap();
+    assert!(talk.contains("holds no data files (.nc, "), "{talk}");
+    assert!(talk.contains("there is nothing to survey"), "{talk}");
+
+    std::fs::write(folder.join("text.nc"), "this is no grid").unwrap();
+    let output = program::run(&data, &words).unwrap();
+    let [table, talk] = [output.stdout, output.stderr].map(|it| String::from_utf8(it).unwrap());
+    assert!(!output.status.success(), "{talk}");
+    assert!(table.contains("refused (unreadable)"), "{table}");
+    assert!(talk.contains("none of 1 files would land"), "{talk}");
+
+    // What would land beside it is an answer.
+    harness::granule::write(&folder, 0, 0).unwrap();
+    let table = program::succeed(&data, &words).unwrap();
+    assert!(table.contains("refused (unreadable)"), "{table}");
+    assert!(table.contains("lands in"), "{table}");
+}
+
+#[test]
 fn the_same_file_twice_lands_once() {
     let files = flux_files();
     let data = tempfile::tempdir().unwrap();
