@@ -1,15 +1,17 @@
-//! Real servers (Kafka, PostGIS, S3, HDFS) of a test's own: on free ports, in its own folder, stopped when dropped.
+//! Real servers (Kafka, PostGIS, S3, HDFS) of a test's own: on free ports, in its own folder, stopped when dropped,
+//! and when the test's process ends, killed or not.
 
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
 
 use anyhow::{Context as _, Result, ensure};
 use tempfile::TempDir;
-use test_data::free_port;
+use test_data::{Stopper, free_port};
 
 /// Some of the servers of `deploy/services`.
 pub struct Servers {
-    names: Vec<&'static str>,
+    /// Before the folder, which goes after it.
+    _stopper: Stopper,
     folder: TempDir,
     told: Vec<(&'static str, String)>,
     settings: Vec<(String, String)>,
@@ -33,9 +35,10 @@ impl Servers {
             "FLUXGLOBE_HDFS_HTTP_PORT",
             "FLUXGLOBE_PROMETHEUS_PORT",
         ];
+        let folder = tempfile::tempdir()?;
         let mut servers = Self {
-            names: names.to_vec(),
-            folder: tempfile::tempdir()?,
+            _stopper: Stopper::new(names, folder.path())?,
+            folder,
             told: ports.map(|name| (name, port())).to_vec(),
             settings: vec![],
         };
@@ -105,13 +108,6 @@ impl Servers {
             "services.sh {verb} {names:?} failed:\n{talk}"
         );
         Ok(String::from_utf8(output.stdout)?)
-    }
-}
-
-impl Drop for Servers {
-    fn drop(&mut self) {
-        // A server that cannot be stopped is left to the end of the machine; the test has its verdict already.
-        drop(self.script("stop", &self.names));
     }
 }
 

@@ -6,10 +6,12 @@ use std::process::Command;
 use rdkafka::ClientConfig;
 use rdkafka::consumer::{BaseConsumer, Consumer as _};
 use std::time::{Duration, Instant};
-use test_data::free_port;
+use test_data::{Stopper, free_port};
 
-/// Stopped and removed when dropped.
+/// Stopped and removed when dropped, and when this process ends.
 pub(crate) struct Broker {
+    /// Before the folder, which goes after it.
+    _stopper: Stopper,
     folder: tempfile::TempDir,
     port: u16,
     controller_port: u16,
@@ -17,8 +19,10 @@ pub(crate) struct Broker {
 
 impl Broker {
     pub(crate) fn start() -> Self {
+        let folder = tempfile::tempdir().unwrap();
         let broker = Self {
-            folder: tempfile::tempdir().unwrap(),
+            _stopper: Stopper::new(&["kafka"], folder.path()).unwrap(),
+            folder,
             port: free_port(),
             controller_port: free_port(),
         };

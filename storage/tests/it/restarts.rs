@@ -16,16 +16,20 @@ const OBJECT_BYTES: usize = 100_000;
 /// How long the server is gone each time; less than the retry limit of a store.
 const AWAY: Duration = Duration::from_secs(1);
 
-/// A server in a folder and on a port of its own; stopped with this value.
+/// A server in a folder and on a port of its own; stopped with this value, and with this process.
 struct Server {
+    /// Before the folder, which goes after it.
+    _stopper: test_data::Stopper,
     run: tempfile::TempDir,
     port: u16,
 }
 
 impl Server {
     fn start() -> Self {
+        let run = tempfile::tempdir().unwrap();
         let server = Self {
-            run: tempfile::tempdir().unwrap(),
+            _stopper: test_data::Stopper::new(&["s3"], run.path()).unwrap(),
+            run,
             port: test_data::free_port(),
         };
         server.tell("start");
@@ -60,12 +64,6 @@ impl Server {
         let pid = std::fs::read_to_string(pid).unwrap();
         let killed = Command::new("kill").args(["-9", pid.trim()]).status();
         assert!(killed.unwrap().success(), "there was no server to kill");
-    }
-}
-
-impl Drop for Server {
-    fn drop(&mut self) {
-        self.tell("stop");
     }
 }
 

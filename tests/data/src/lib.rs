@@ -1,6 +1,6 @@
 //! Where tests find files that nobody on this project made, and who may end without having run. What is missing is a
 //! failure, but for the tests on a named list, which need what not everybody can have: those say so, and `make test`
-//! counts them. And where servers of theirs may listen.
+//! counts them. And where servers of theirs may listen, and what ends these.
 //!
 //! | data | where | when missing |
 //! |---|---|---|
@@ -10,11 +10,13 @@
 
 pub mod frozen;
 mod ports;
+mod stopper;
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 pub use ports::free_port;
+pub use stopper::Stopper;
 
 /// Tests that may end without having run, a name a line.
 pub const LIST: &str = include_str!("../may-not-run.txt");
