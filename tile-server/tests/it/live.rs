@@ -48,6 +48,10 @@ impl Live {
 
     async fn over(log: Arc<Log>) -> Self {
         let app = TestApp::with(|settings| settings.catalogue_age_ms = 3_600_000).await;
+        Self::of(app, log)
+    }
+
+    fn of(app: TestApp, log: Arc<Log>) -> Self {
         let stop = Stop::new();
         let running = tokio::spawn(app.state.live(log.clone()).run(stop.clone()));
         Self {
@@ -66,6 +70,14 @@ impl Live {
     /// Its server has looked at what there is, and then found the log away.
     async fn misses_its_log(&self) {
         self.until(async || self.log.missed.load(Ordering::SeqCst) > 0)
+            .await;
+    }
+
+    /// Its server has looked for the log more often.
+    async fn misses_its_log_again(&self) {
+        let before = self.log.missed.load(Ordering::SeqCst);
+        // The one look may have begun before this.
+        self.until(async || self.log.missed.load(Ordering::SeqCst) > before + 1)
             .await;
     }
 
@@ -294,6 +306,39 @@ async fn a_log_that_is_away_is_waited_for_and_what_landed_meanwhile_is_told() {
     let told = viewer.next().await.unwrap();
     assert_eq!(told.data["manifest"], new.to_string());
     assert_eq!(told.data["touched"][0]["start"], "2000-02-01T00:00:00Z");
+}
+
+#[tokio::test]
+async fn the_first_product_of_an_empty_store_is_told_of_though_the_log_was_away_when_it_landed() {
+    let log = Arc::new(Log::default());
+    log.is_away.store(true, Ordering::SeqCst);
+    let live = Live::of(TestApp::empty(|_settings| {}), log);
+    let mut viewer = Viewer::new(&live.app, None).await;
+    live.misses_its_log().await;
+    let (product, quantity) = ("sst", Quantity::SeaSurfaceTemperature);
+    let first = live.app.land(product, quantity, 1).await;
+    // Somebody sees it in the list while the log is still looked for: it is no less news to those who do not look.
+    live.until(async || {
+        let listed = live.app.get("/api/products").await.json();
+        listed["products"][0]["product"] == product
+    })
+    .await;
+    live.misses_its_log_again().await;
+    live.log.is_away.store(false, Ordering::SeqCst);
+    live.follows().await;
+    let told = viewer.next().await.unwrap();
+    assert_eq!(told.data["manifest"], first.to_string());
+    let all = serde_json::json!([{"start": "2000-01-01T00:00:00Z", "end": "2000-04-01T00:00:00Z"}]);
+    assert_eq!(told.data["touched"], all, "all that there is");
+    // Its event comes when the log is back, and is no news.
+    live.landed(&first).await;
+    let second = live.app.land_last_month(product, quantity, 2, None).await;
+    live.landed(&second).await;
+    let told = viewer.next().await.unwrap();
+    assert_eq!(told.data["manifest"], second.to_string());
+    assert_eq!(told.data["touched"][0]["start"], "2000-02-01T00:00:00Z");
+    live.stop.now();
+    live.running.await.unwrap().unwrap();
 }
 
 #[tokio::test]
