@@ -27,3 +27,4 @@ mod reread;
 mod same_answers;
 mod sea;
 mod sql;
+mod tracked_files;
