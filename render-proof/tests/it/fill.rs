@@ -9,10 +9,7 @@ use render_proof::fill::timing::{Case, bench_fill};
 
 #[test]
 fn the_bench_measures_every_form_and_checks_its_answers() {
-    #[expect(clippy::disallowed_methods, reason = "a test's own switch")]
-    let is_off = std::env::var("NO_GPU").is_ok_and(|value| value == "1");
-    if is_off {
-        println!("skipped without a GPU: fill bench");
+    if test_data::is_without_gpu("the bench of gap filling") {
         return;
     }
     let gpu = &Gpu::open().expect("a Vulkan adapter, or NO_GPU=1");

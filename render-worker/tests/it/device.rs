@@ -2,10 +2,5 @@
 
 /// False if it is switched off for this run.
 pub(crate) fn is_wanted(test: &str) -> bool {
-    #[expect(clippy::disallowed_methods, reason = "a test's own switch")]
-    let is_off = std::env::var("NO_GPU").is_ok_and(|value| value == "1");
-    if is_off {
-        println!("skipped without a GPU: {test}");
-    }
-    !is_off
+    !test_data::is_without_gpu(test)
 }

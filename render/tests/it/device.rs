@@ -4,20 +4,12 @@ use std::sync::OnceLock;
 
 use render::gpu::Gpu;
 use render::{Backend, Renderer};
-
-fn is_switched_off(test: &str) -> bool {
-    #[expect(clippy::disallowed_methods, reason = "a test's own switch")]
-    let off = std::env::var("NO_GPU").is_ok_and(|value| value == "1");
-    if off {
-        println!("skipped without a GPU: {test}");
-    }
-    off
-}
+use test_data::is_without_gpu;
 
 /// The device, shared by the tests of this run; none if it is switched off.
 pub(crate) fn gpu(test: &str) -> Option<&'static Gpu> {
     static GPU: OnceLock<Gpu> = OnceLock::new();
-    (!is_switched_off(test))
+    (!is_without_gpu(test))
         .then(|| GPU.get_or_init(|| Gpu::open().expect("a Vulkan adapter, or NO_GPU=1")))
 }
 
@@ -25,14 +17,14 @@ pub(crate) fn gpu(test: &str) -> Option<&'static Gpu> {
 pub(crate) fn checked_gpu(test: &str) -> Option<&'static Gpu> {
     static GPU: OnceLock<Gpu> = OnceLock::new();
     let open = || Gpu::open_checked().expect("a Vulkan adapter, or NO_GPU=1");
-    (!is_switched_off(test)).then(|| GPU.get_or_init(open))
+    (!is_without_gpu(test)).then(|| GPU.get_or_init(open))
 }
 
 /// A renderer on the device, shared likewise.
 pub(crate) fn gpu_renderer(test: &str) -> Option<&'static Renderer> {
     static RENDERER: OnceLock<Renderer> = OnceLock::new();
     let open = || Renderer::new(Backend::Gpu).expect("a Vulkan adapter, or NO_GPU=1");
-    (!is_switched_off(test)).then(|| RENDERER.get_or_init(open))
+    (!is_without_gpu(test)).then(|| RENDERER.get_or_init(open))
 }
 
 /// Both back ends, or the CPU twins alone.

@@ -9,12 +9,14 @@
 #![expect(clippy::print_stderr, reason = "a test that does not run says so")]
 
 pub mod frozen;
+mod graphics;
 mod ports;
 mod stopper;
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
+pub use graphics::is_without_gpu;
 pub use ports::free_port;
 pub use stopper::Stopper;
 
@@ -134,8 +136,8 @@ pub fn not_run(lacks: &str) {
     note(test);
 }
 
-/// Adds a test to the file that counts those which did not run.
-fn note(test: &str) {
+/// Adds a line to the file that counts what did not run: the name of a test, or what went without a graphics device.
+fn note(line: &str) {
     let Some(file) = variable("FLUXGLOBE_SKIPPED") else {
         return;
     };
@@ -143,7 +145,7 @@ fn note(test: &str) {
         .create(true)
         .append(true)
         .open(&file)
-        .and_then(|mut file| writeln!(file, "{test}"));
+        .and_then(|mut file| writeln!(file, "{line}"));
     assert!(
         appended.is_ok(),
         "cannot write {}: {appended:?}",
