@@ -19,11 +19,11 @@ count() { if [ -n "$1" ]; then wc -l <<<"$1"; else echo 0; fi; }
 not_run=$(count "$names")
 if [ -n "$names" ]; then
     echo "tests that did not run here, and may not (tests/data/may-not-run.txt says what each lacks):"
-    sed 's/^/    /' <<<"$names"
+    printf '%s\n' "$names" | sed 's/^/    /'
 fi
 if [ -n "$switched_off" ]; then
     echo "$(count "$switched_off") things were not tested for want of a graphics device, since NO_GPU=1 says so:"
-    sed 's/^/    /' <<<"$switched_off"
+    printf '%s\n' "$switched_off" | sed 's/^/    /'
 fi
 echo "$not_run of at most $listed listed tests did not run"
 [ "$not_run" -le "$listed" ]
