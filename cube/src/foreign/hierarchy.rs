@@ -319,6 +319,11 @@ impl Foreign {
         }
     }
 
+    /// Why an array that is there cannot be read; none of one that can be, or that is not there.
+    pub fn unread(&self, name: &str) -> Option<&ForeignError> {
+        self.arrays.get(name)?.as_ref().err()
+    }
+
     /// What of an array changed since an earlier state of the repository. None where that cannot be told: it is no repository,
     /// the state is no ancestor of this one or has been let go, or the array was made anew.
     pub async fn changed_since(&self, snapshot: &str, array: &str) -> Option<Changed> {

@@ -101,6 +101,11 @@ impl Arrays {
         Ok(read)
     }
 
+    /// Why an array that is there is not among those that are described: a codec, say, that this program does not have.
+    pub(crate) fn unread(&self, variable: &str) -> Option<&ForeignError> {
+        self.foreign.unread(variable)
+    }
+
     /// What was taken for granted of coordinates that were read.
     pub(crate) fn assumptions(&self) -> Vec<String> {
         lock(&self.unwritten).iter().cloned().collect()

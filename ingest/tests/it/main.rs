@@ -5,6 +5,7 @@
 
 mod attached;
 mod attached_again;
+mod attached_bounds;
 mod attached_shards;
 mod attached_web;
 mod attributes;
