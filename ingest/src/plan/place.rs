@@ -28,8 +28,12 @@ pub(super) async fn mapping(
     let rules = planning.profile.map(|p| p.grid.clone()).unwrap_or_default();
     projection::check(planning.file, variable)?;
     if let Some(name) = projection::missing(planning.file, variable) {
+        let what = match planning.values.unread(name) {
+            Some(_) => "cannot be read",
+            None => "is not in the file",
+        };
         planning.assume(format!(
-            "{}: its grid_mapping {name:?} is not in the file; its axes are taken for latitude and longitude",
+            "{}: its grid_mapping {name:?} {what}; its axes are taken for latitude and longitude",
             variable.name
         ));
     }

@@ -146,5 +146,17 @@ async fn an_array_that_nothing_needs_may_be_of_any_kind() {
     let own = Own::with("v3-gzip.zarr");
     add(&own, "depth_bnds", &[6, 2], &edges());
     pack(&own, "depth_bnds");
-    assert_eq!(own.attach().await.unwrap().steps, 3);
+    // What its axes say is enough, and that nothing more is known is told.
+    add(&own, "crs", &[1], &[0.0]);
+    pack(&own, "crs");
+    own.edit("sst/zarr.json", |it| {
+        it["attributes"]["grid_mapping"] = json!("crs");
+    });
+    let attached = own.attach().await.unwrap();
+    let told = "grid_mapping \"crs\" cannot be read";
+    assert!(
+        attached.steps == 3 && attached.assumptions.iter().any(|own| own.contains(told)),
+        "{:?}",
+        attached.assumptions
+    );
 }
