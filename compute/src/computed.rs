@@ -162,10 +162,13 @@ impl Plan {
         if let Computation::Regrid { method, .. } = request.how {
             check_regridded(first, method)?;
         }
-        let title = match &request.title {
-            Some(title) => title.clone(),
-            None if matches!(request.how, Computation::Regrid { .. }) => first.title.clone(),
-            None => format!("{}, computed", job.quantity.title()),
+        let title = match (&request.title, &request.how) {
+            (Some(title), _) => title.clone(),
+            (None, Computation::Regrid { method, .. }) => format!(
+                "{}, regridded to {} x {} cells ({method})",
+                first.title, job.target_grid.rows, job.target_grid.cols
+            ),
+            (None, _) => format!("{}, computed", job.quantity.title()),
         };
         Ok(Self {
             matches: matched::steps(&inputs, (request.from, request.to))?,

@@ -442,6 +442,10 @@ async fn a_product_brought_to_another_grid_keeps_its_integral_and_fits_in_an_exp
         (manifest.grid, manifest.quantity, manifest.steps.len()),
         (FOUR_DEGREES, flux, 12)
     );
+    // What it is stands in its title, and not only what it is of.
+    let source = manifests::latest(&store, &product("fine")).await;
+    let own = ", regridded to 45 x 90 cells (conservative)";
+    assert_eq!(manifest.title, source.unwrap().unwrap().title + own);
     // With its coverage the integral is that of the source, but for what f32 rounds.
     let regridder =
         compute::regrid::Regridder::new(&ONE_DEGREE, &FOUR_DEGREES, Regridding::Conservative);

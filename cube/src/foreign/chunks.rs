@@ -167,10 +167,7 @@ fn missing(array: &ForeignArray, place: &str, absent: Absent) -> ForeignError {
             "is not there, and it then stands for the fill value {fill}, which is no missing value here: nothing tells whether it was never written; write it, or say _FillValue in the attributes"
         ),
     };
-    ForeignError {
-        is_absent: true,
-        ..ForeignError::refused(format!("{} {place}", array.place), reason)
-    }
+    ForeignError::absent(format!("{} {place}", array.place), reason)
 }
 
 /// Refuses a part of which something is not there.

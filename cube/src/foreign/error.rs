@@ -12,7 +12,7 @@ pub struct ForeignError {
     pub reason: String,
     /// Where that lies.
     pub cause: Cause,
-    /// Is it a chunk that is not there?
+    /// Is it that something is not there: a chunk, a bucket, or a store at its address?
     pub is_absent: bool,
 }
 
@@ -24,6 +24,14 @@ impl ForeignError {
             reason: reason.into(),
             cause: Cause::Content,
             is_absent: false,
+        }
+    }
+
+    /// What is not there.
+    pub fn absent(place: impl Into<String>, reason: impl Into<String>) -> Self {
+        Self {
+            is_absent: true,
+            ..Self::refused(place, reason)
         }
     }
 

@@ -78,42 +78,39 @@ impl Found {
     /// # Errors
     /// Nothing that is read, or no answer.
     pub async fn at(objects: &Arc<dyn Objects>) -> Result<Self, ForeignError> {
-        let of = |kind| {
-            Ok(Self {
-                kind,
-                snapshot: None,
-            })
-        };
         // Where nothing may be listed, what is not there is refused as what must not be read is.
         let mut denied = None;
-        let mut is_there = async |name: &str| match objects.size(name).await {
-            Err(e) if e.cause == Cause::Access => {
-                denied.get_or_insert(e);
-                Ok(false)
-            }
-            size => size.map(|size| size.is_some()),
-        };
         for (name, kind) in [
-            ("zarr.json", StoreKind::Zarr3),
-            (".zmetadata", StoreKind::Zarr2),
-            (".zgroup", StoreKind::Zarr2),
-            ("repo", StoreKind::Icechunk),
-            ("refs/branch.main/ref.json", StoreKind::Icechunk),
+            ("zarr.json", Some(StoreKind::Zarr3)),
+            (".zmetadata", Some(StoreKind::Zarr2)),
+            (".zgroup", Some(StoreKind::Zarr2)),
+            ("repo", Some(StoreKind::Icechunk)),
+            ("refs/branch.main/ref.json", Some(StoreKind::Icechunk)),
+            (".zarray", None),
         ] {
-            if is_there(name).await? {
-                return of(kind);
+            let is_there = match objects.size(name).await {
+                Err(e) if e.cause == Cause::Access => {
+                    denied.get_or_insert(e);
+                    false
+                }
+                size => size?.is_some(),
+            };
+            if !is_there {
+                continue;
             }
+            let Some(kind) = kind else {
+                let reason =
+                    "is a single array: give the group that it lies in, with its coordinates";
+                return Err(ForeignError::refused(objects.place(), reason));
+            };
+            return Ok(Self {
+                kind,
+                snapshot: None,
+            });
         }
-        let is_array = is_there(".zarray").await?;
-        if let Some(denied) = denied.filter(|_| !is_array) {
-            return Err(denied);
-        }
-        let reason = if is_array {
-            "is a single array: give the group that it lies in, with its coordinates"
-        } else {
-            "is neither a Zarr group (zarr.json, .zgroup) nor an Icechunk repository (repo)"
-        };
-        Err(ForeignError::refused(objects.place(), reason))
+        let reason =
+            "is neither a Zarr group (zarr.json, .zgroup) nor an Icechunk repository (repo)";
+        Err(denied.unwrap_or_else(|| ForeignError::absent(objects.place(), reason)))
     }
 }
 
@@ -317,6 +314,11 @@ impl Foreign {
                 Err(ForeignError::refused(&self.place, reason))
             }
         }
+    }
+
+    /// Why an array that is there cannot be read; none of one that can be, or that is not there.
+    pub fn unread(&self, name: &str) -> Option<&ForeignError> {
+        self.arrays.get(name)?.as_ref().err()
     }
 
     /// What of an array changed since an earlier state of the repository. None where that cannot be told: it is no repository,

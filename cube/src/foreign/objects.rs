@@ -64,7 +64,7 @@ impl StoredObjects {
             return Err(ForeignError::refused(location, reason));
         }
         if is_folder && !FilePath::new(folder).is_dir() {
-            return Err(ForeignError::refused(location, "there is no such folder"));
+            return Err(ForeignError::absent(location, "there is no such folder"));
         }
         let store =
             Store::open_of_others(if is_folder { folder } else { location }).map_err(shown)?;
@@ -94,6 +94,7 @@ impl StoredObjects {
                 ForeignError::refused(place, reason)
             });
         };
+        let is_absent = matches!(refusal, Refusal::Bucket(_));
         let reason = match refusal {
             Refusal::Absent => return None,
             Refusal::Credentials(said) => format!(
@@ -110,7 +111,10 @@ impl StoredObjects {
                 "the store takes no such request ({said}): look at region, endpoint and token in the environment (docs/operations.md)"
             ),
         };
-        Some(ForeignError::denied(place, reason))
+        Some(ForeignError {
+            is_absent,
+            ..ForeignError::denied(place, reason)
+        })
     }
 }
 

@@ -4,12 +4,13 @@ use std::sync::Arc;
 
 use async_trait::async_trait;
 use contract::masked::MaskedCells;
+use contract::time::Period;
 use cube::foreign::{Absent, Foreign, ForeignError, Found};
 use quick_cache::sync::Cache;
 use storage::attached::{Attachment, Cause, Failure, Reference, Source, StoreKind};
 
-use super::address;
 use super::reading::Reading;
+use super::{address, moved};
 use crate::check::Found as FoundValues;
 use crate::decode::{DecodedBand, Slab, converted, is_plane};
 use crate::inspect::arrays::Arrays;
@@ -75,27 +76,10 @@ impl Source for ForeignFields {
             cause: Cause::Content,
         };
         let reading = Reading::of(attachment).map_err(refused)?;
-        let failed = |error: ForeignError| {
-            let advice = match error.cause {
-                Cause::Content => format!(
-                    "; if the store has changed since it was attached, run `fluxglobe attach --refresh {}`",
-                    attachment.product
-                ),
-                Cause::Access | Cause::Away => String::new(),
-            };
-            // What is wrong with the store is wrong with the array.
-            let array = if error.place.contains(" array ") {
-                String::new()
-            } else {
-                format!(" array {}", attachment.array)
-            };
-            Failure {
-                place: format!("step {period}, {}{array}", error.place),
-                reason: format!("{}{advice}", error.reason),
-                cause: error.cause,
-            }
+        let foreign = match self.foreign(attachment).await {
+            Ok(foreign) => foreign,
+            Err(error) => return Err(failed(error, attachment, period).await),
         };
-        let foreign = self.foreign(attachment).await.map_err(failed)?;
         let absent = if reading.absent_is_no_data {
             Absent::Fill
         } else {
@@ -113,12 +97,51 @@ impl Source for ForeignFields {
         let rows = 0..reading.mapping.file_rows.len() as u32;
         let slab = Slab::of(&reading.mapping, step, &rows);
         let parts: Vec<_> = reading.axes.iter().map(|axis| slab.part(axis)).collect();
-        let stored = arrays.values(&attachment.array, &parts).await;
-        let stored = stored.map_err(failed)?;
+        let stored = match arrays.values(&attachment.array, &parts).await {
+            Ok(stored) => stored,
+            Err(error) => return Err(failed(error, attachment, period).await),
+        };
         let made = tokio::task::spawn_blocking(move || made(&reading, step, &stored));
         made.await
             .map_err(|e| refused(e.to_string()))?
             .map_err(refused)
+    }
+
+    async fn gone(&self, attachment: &Attachment, reference: &Reference) -> Option<Failure> {
+        let gone = moved::gone(attachment).await?;
+        Some(of_step(gone, attachment, reference.period))
+    }
+}
+
+/// What failed of a step, and what to do.
+async fn failed(error: ForeignError, attachment: &Attachment, period: Period) -> Failure {
+    let may_be_gone = error.cause == Cause::Content || error.is_absent;
+    if may_be_gone && let Some(gone) = moved::gone(attachment).await {
+        return of_step(gone, attachment, period);
+    }
+    let advice = match error.cause {
+        Cause::Content => format!(
+            "; if the store has changed since it was attached, run `fluxglobe attach --refresh {}`",
+            attachment.product
+        ),
+        Cause::Access | Cause::Away => String::new(),
+    };
+    let reason = format!("{}{advice}", error.reason);
+    of_step(ForeignError { reason, ..error }, attachment, period)
+}
+
+/// An error as that of a step.
+fn of_step(error: ForeignError, attachment: &Attachment, period: Period) -> Failure {
+    // What is wrong with the store is wrong with the array.
+    let array = if error.place.contains(" array ") {
+        String::new()
+    } else {
+        format!(" array {}", attachment.array)
+    };
+    Failure {
+        place: format!("step {period}, {}{array}", error.place),
+        reason: error.reason,
+        cause: error.cause,
     }
 }
 

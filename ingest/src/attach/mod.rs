@@ -13,6 +13,7 @@
 mod address;
 mod fields;
 mod kept;
+mod moved;
 mod publish;
 mod reading;
 mod steps;
@@ -115,7 +116,7 @@ pub async fn attach(
 /// Attaches anew what a product is attached to: steps that came since, and those that were revised, become its next version.
 ///
 /// # Errors
-/// As [`attach`]; and a product that is not attached.
+/// As [`attach`]; and a product that is not attached. Of a store that is no longer there it is said how it is attached elsewhere.
 pub async fn refresh(
     store: &Store,
     product: &ProductId,
@@ -135,7 +136,15 @@ pub async fn refresh(
         let detail = "its values are here: nothing of it is attached";
         return Err(refused(detail).into());
     };
-    attach(store, &request_of(&before)?, told).await
+    match attach(store, &request_of(&before)?, told).await {
+        // What is gone from its address cannot be refreshed.
+        Err(AttachError::Refused(refused)) => {
+            let gone = moved::gone(&before).await;
+            let gone = gone.map(|gone| Rejection::new(refused.reason, gone.place, gone.reason));
+            Err(AttachError::Refused(gone.unwrap_or(refused)))
+        }
+        attached => attached,
+    }
 }
 
 /// The request that led to an attachment.

@@ -157,10 +157,7 @@ fn is_another(before: &Attachment, now: &Attachment) -> Result<Option<String>, I
             product: of.product.to_string(),
             detail,
         })?;
-        let each = reading.indexes.iter();
-        Ok::<_, IngestError>(each.fold(String::new(), |text, (name, index)| {
-            format!("{text} --index {name}={index}")
-        }))
+        Ok::<_, IngestError>(reading.index_words())
     };
     let (was, is) = (indexes(before)?, indexes(now)?);
     if (&before.store, &before.array, &was) == (&now.store, &now.array, &is) {

@@ -39,6 +39,14 @@ impl Reading {
             .map_err(|e| format!("its attachment is of another program: {e}"))
     }
 
+    /// The words that say which indexes are read, each with a space before it.
+    pub(super) fn index_words(&self) -> String {
+        let each = self.indexes.iter();
+        each.fold(String::new(), |text, (name, index)| {
+            format!("{text} --index {name}={index}")
+        })
+    }
+
     /// Forgets how many steps there are.
     pub(super) fn without_length_of_time(&mut self) {
         let times = self.axes.iter_mut().filter(|axis| axis.role == Role::Time);

@@ -101,6 +101,11 @@ impl Arrays {
         Ok(read)
     }
 
+    /// Why an array that is there is not among those that are described: a codec, say, that this program does not have.
+    pub(crate) fn unread(&self, variable: &str) -> Option<&ForeignError> {
+        self.foreign.unread(variable)
+    }
+
     /// What was taken for granted of coordinates that were read.
     pub(crate) fn assumptions(&self) -> Vec<String> {
         lock(&self.unwritten).iter().cloned().collect()
@@ -220,6 +225,9 @@ fn attribute(name: &str, value: &Value, kind: Kind) -> Option<AttributeValue> {
             None => AttributeValue::Text(cut(text)),
         });
     }
+    if let Some(text) = joined(value) {
+        return Some(AttributeValue::Text(cut(&text)));
+    }
     let numbers: Vec<&Value> = match value {
         Value::Array(all) => all.iter().take(MAX_ATTRIBUTE_NUMBERS).collect(),
         Value::Number(_) | Value::Bool(_) => vec![value],
@@ -242,6 +250,13 @@ fn attribute(name: &str, value: &Value, kind: Kind) -> Option<AttributeValue> {
         },
         bits: bits.filter(|bits| !bits.is_empty())?,
     })
+}
+
+/// Several texts, joined by spaces as those of a file are; none of numbers, some of which JSON can only name.
+fn joined(value: &Value) -> Option<String> {
+    let texts: Option<Vec<&str>> = value.as_array()?.iter().map(Value::as_str).collect();
+    let texts = texts.filter(|all| all.iter().any(|text| not_finite(text).is_none()))?;
+    Some(texts.join(" "))
 }
 
 /// A number that JSON cannot hold: by its name, or (as xarray writes fill values in Zarr version 3) in base 64.
@@ -275,7 +290,19 @@ fn cut(text: &str) -> String {
 
 #[cfg(test)]
 mod tests {
+    use serde_json::json;
+
     use super::*;
+
+    #[test]
+    fn several_texts_are_one_and_several_names_of_numbers_are_numbers() {
+        let of = |value: Value| attribute("valid_range", &value, Kind::Float(4));
+        let text = of(json!(["0.0", "100.0"]));
+        assert_eq!(text, Some(AttributeValue::Text("0.0 100.0".to_owned())));
+        let numbers = of(json!(["-Infinity", "Infinity"]));
+        assert!(matches!(numbers, Some(AttributeValue::Numbers { .. })));
+        assert_eq!(of(json!([])), None);
+    }
 
     #[test]
     fn fill_values_that_json_cannot_hold_are_read_by_name_or_in_base_64() {

@@ -1,5 +1,7 @@
 //! Where values are asked for: the reader process of a file, or arrays of a store of others.
 
+use cube::foreign::ForeignError;
+
 use super::arrays::Arrays;
 use super::file::description::Part;
 use super::reader::session::Session;
@@ -30,6 +32,15 @@ impl Values {
         match self {
             Self::Process(session) => session.read(variable, part, expected).await,
             Self::Arrays(arrays) => arrays.read(variable, part, expected).await,
+        }
+    }
+
+    /// Why a variable that is there was not described; none where all were, or it is not there.
+    pub(crate) fn unread(&self, variable: &str) -> Option<&ForeignError> {
+        match self {
+            // What is damaged in a file refuses the file.
+            Self::Process(_) => None,
+            Self::Arrays(arrays) => arrays.unread(variable),
         }
     }
 

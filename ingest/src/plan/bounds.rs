@@ -3,23 +3,29 @@
 use contract::time::Period;
 
 use super::refused::refused;
-use super::{Planning, stamps};
+use super::{Planning, no_bounds, stamps};
 use crate::error::{Rejection, Stop};
 use crate::inspect::file::description::Part;
 use crate::plan::cf::calendar::CalendarDate;
 use crate::plan::cf::cell_methods::TimeMethod;
 use crate::plan::cf::period;
 
+/// What a profile can state where bounds cannot be read.
+const INSTEAD: &str = "the time";
+
 /// What the bounds of a time axis say.
 pub(super) enum Bounds {
     Periods(Vec<Period>),
     /// Both bounds of every step are its stamp.
     Instants,
-    /// There are none, or none that can be read.
+    /// There are none.
     Silent,
 }
 
 /// Reads the bounds of a time axis.
+///
+/// # Errors
+/// They are there and cannot be read, or do not hold their stamps.
 pub(super) async fn read(
     planning: &mut Planning<'_>,
     time: &str,
@@ -38,7 +44,7 @@ pub(super) async fn read(
     };
     let Some(dates) = dates(planning, time, &name, stamps.len() as u64).await? else {
         planning.assume(format!(
-            "{time}: names bounds {name:?}, which are not there as two numbers a step; they are passed over"
+            "{time}: names bounds {name:?}, which are not there; they are passed over"
         ));
         return Ok(Bounds::Silent);
     };
@@ -68,20 +74,21 @@ pub(super) async fn read(
     Ok(Bounds::Periods(periods))
 }
 
-/// Both dates of every step; none if no variable of that shape holds them.
+/// Both dates of every step; none if they are not there.
 async fn dates(
     planning: &mut Planning<'_>,
     time: &str,
     bounds: &str,
     count: u64,
 ) -> Result<Option<Vec<[CalendarDate; 2]>>, Stop> {
-    let Some(variable) = planning.file.variable(bounds).filter(|v| v.is_numeric()) else {
+    let Some(variable) = planning.bounds_of((time, bounds), INSTEAD)? else {
         return Ok(None);
     };
     let lens: Vec<u64> = variable.dimensions.iter().map(|d| d.len).collect();
     // A scalar time has bounds of one dimension.
-    if lens != [count, 2] && !(count == 1 && lens == [2]) {
-        return Ok(None);
+    let is_pairs = lens == [count, 2] || (count == 1 && lens == [2]);
+    if !(variable.is_numeric() && is_pairs) {
+        return Err(refused(time, no_bounds(variable, INSTEAD)).into());
     }
     let parts = vec![Part::All; lens.len()];
     let unit = stamps::unit(planning, time, None, None)?;
@@ -106,7 +113,7 @@ async fn climatology(
     }
     let Some(dates) = dates(planning, time, name, stamps.len() as u64).await? else {
         let detail = format!(
-            "is a climatology whose bounds {name:?} are not there as two numbers a step; say in a profile what a step covers"
+            "is a climatology whose bounds {name:?} are not there; say in a profile what a step covers"
         );
         return Err(refused(time, detail).into());
     };

@@ -3,13 +3,16 @@
 use contract::event::RejectReason;
 use contract::grid::wrap_lon_deg;
 
-use super::Planning;
+use super::{Planning, no_bounds};
 use crate::error::{Rejection, Stop};
 use crate::inspect::file::description::Part;
 use crate::plan::cf::packing::Packing;
 
 /// How far bounds may be off, in cells: those of single precision are.
 const TOLERANCE_CELLS: f64 = 0.02;
+
+/// What a profile can state where bounds cannot be read.
+const INSTEAD: &str = "the grid";
 
 /// What an axis is of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -21,7 +24,7 @@ pub(super) enum Along {
 /// The middles of the cells of an axis: its labels, unless its bounds say otherwise.
 ///
 /// # Errors
-/// Bounds that are no cells side by side as the labels are.
+/// Bounds that are there and cannot be read, or are no cells side by side as the labels are.
 pub(super) async fn middles(
     planning: &mut Planning<'_>,
     (name, labels): (&str, Vec<f64>),
@@ -33,21 +36,29 @@ pub(super) async fn middles(
         return Ok(labels);
     };
     let count = labels.len() as u64;
-    let held = planning.file.variable(&bounds).filter(|variable| {
-        let mut lens = variable.dimensions.iter().map(|own| own.len);
-        variable.is_numeric() && lens.by_ref().eq([count, 2])
-    });
-    let Some(held) = held else {
+    let Some(held) = planning.bounds_of((name, &bounds), INSTEAD)? else {
         planning.assume(format!(
-            "{name}: names bounds {bounds:?}, which are not there as two numbers a cell; its labels are taken for the middles of cells"
+            "{name}: names bounds {bounds:?}, which are not there; its labels are taken for the middles of cells"
         ));
         return Ok(labels);
     };
+    let lens: Vec<u64> = held.dimensions.iter().map(|own| own.len).collect();
+    let is_pairs = lens.ends_with(&[count, 2]) && !lens.contains(&0);
+    if !(held.is_numeric() && is_pairs) {
+        let detail = no_bounds(held, INSTEAD);
+        return Err(Rejection::new(RejectReason::Grid, name, detail).into());
+    }
+    // Programs that put files one behind the other give bounds a time, as they do the values.
+    let more = lens.len() - 2;
+    if more > 0 {
+        planning.assume(format!(
+            "{name}: its bounds {bounds:?} have more dimensions than it has; the first of each is taken"
+        ));
+    }
+    let parts = [vec![Part::At(0); more], vec![Part::All; 2]].concat();
     // What is valid is said of labels, and edges may lie beyond.
     let packing = Packing::of(held).with_valid_values(f64::NEG_INFINITY, f64::INFINITY);
-    let stored = planning
-        .values
-        .read(&bounds, &[Part::All, Part::All], count * 2);
+    let stored = planning.values.read(&bounds, &parts, count * 2);
     let values: Vec<f64> = stored
         .await?
         .into_iter()

@@ -25,6 +25,8 @@ use contract::event::RejectReason;
 use contract::product::ProductId;
 use contract::quantity::Quantity;
 use contract::time::Period;
+use cube::foreign::ForeignError;
+use storage::attached::Cause;
 
 use crate::error::{Rejection, Stop};
 use crate::fetch::RawGranule;
@@ -200,18 +202,63 @@ pub(crate) async fn plan(
     })
 }
 
+/// What is said of an axis whose bounds are there and are not two numbers a label. `instead` is what can be stated in a profile.
+fn no_bounds(bounds: &Variable, instead: &str) -> String {
+    let lens: Vec<u64> = bounds.dimensions.iter().map(|own| own.len).collect();
+    format!(
+        "names bounds {:?}, which are not two numbers for each of its labels but {} of the shape {lens:?}; write them otherwise, or state {instead} in a profile",
+        bounds.name,
+        bounds.kind.name()
+    )
+}
+
 /// What is told of a file, in which text of it may stand, as one short line.
 pub(crate) fn line(text: impl AsRef<str>) -> String {
     Rejection::new(RejectReason::Values, "", text).detail
 }
 
-impl Planning<'_> {
+impl<'a> Planning<'a> {
     /// Notes what is taken for granted; text of the file becomes one short line.
     fn assume(&mut self, text: impl AsRef<str>) {
         let line = line(text);
         if !self.assumptions.contains(&line) {
             self.assumptions.push(line);
         }
+    }
+
+    /// The bounds that an axis names; none where they are not there. `instead` is what can be stated in a profile.
+    ///
+    /// # Errors
+    /// They are there and cannot be read: without them the labels of the axis may mean something else.
+    fn bounds_of(
+        &self,
+        (axis, bounds): (&str, &str),
+        instead: &str,
+    ) -> Result<Option<&'a Variable>, Rejection> {
+        let Some(unread) = self.values.unread(bounds) else {
+            return Ok(self.file.variable(bounds));
+        };
+        let detail = format!(
+            "is what {axis} names as its bounds, and cannot be read, so that nothing says what its labels stand for; write it otherwise, or state {instead} in a profile: {}",
+            unread.reason
+        );
+        Err(Rejection::new(
+            RejectReason::Unreadable,
+            &unread.place,
+            detail,
+        ))
+    }
+
+    /// Why one of these coordinates, which is there, cannot be read; none if there is no such one.
+    fn unread<'n>(&self, mut names: impl Iterator<Item = &'n str>) -> Option<Rejection> {
+        // Where nothing may be listed, no access is also the answer for what is not there, and a dimension needs no coordinate.
+        let is_there = |own: &&ForeignError| own.cause == Cause::Content;
+        let unread = names.find_map(|name| self.values.unread(name).filter(is_there))?;
+        Some(Rejection::new(
+            RejectReason::Unreadable,
+            &unread.place,
+            &unread.reason,
+        ))
     }
 
     /// All values of a coordinate variable, unpacked; NaN for fill values.

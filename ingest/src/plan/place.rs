@@ -28,8 +28,12 @@ pub(super) async fn mapping(
     let rules = planning.profile.map(|p| p.grid.clone()).unwrap_or_default();
     projection::check(planning.file, variable)?;
     if let Some(name) = projection::missing(planning.file, variable) {
+        let what = match planning.values.unread(name) {
+            Some(_) => "cannot be read",
+            None => "is not in the file",
+        };
         planning.assume(format!(
-            "{}: its grid_mapping {name:?} is not in the file; its axes are taken for latitude and longitude",
+            "{}: its grid_mapping {name:?} {what}; its axes are taken for latitude and longitude",
             variable.name
         ));
     }
@@ -38,7 +42,10 @@ pub(super) async fn mapping(
     name_time(planning, variable, &mut axes);
     let find = |role: Role| axes.iter().find(|a| a.role == role).cloned();
     let (Some(lat), Some(lon)) = (find(Role::Latitude), find(Role::Longitude)) else {
-        return Err(coordinate::no_grid(planning.file, variable).into());
+        let names = variable.dimensions.iter();
+        let unread = planning.unread(names.filter_map(|own| own.name.as_deref()));
+        let no_grid = || coordinate::no_grid(planning.file, variable);
+        return Err(unread.unwrap_or_else(no_grid).into());
     };
     let is_of_a_store = matches!(planning.values, Values::Arrays(_));
     check_others(variable, &axes, is_of_a_store)?;

@@ -162,6 +162,9 @@ async fn by_file(
 ) -> Result<Vec<Period>, Stop> {
     let is_fixed = open::is_fixed(quantity);
     let Some(name) = planning.time_variable(axes) else {
+        if let Some(unread) = unread_time(planning, variable, axes) {
+            return Err(unread.into());
+        }
         let period = coverage::period(planning, None);
         return Ok(vec![period.or_else(|silent| {
             fixed(planning, variable, None, is_fixed, silent)
@@ -194,6 +197,16 @@ async fn by_file(
         periods.reverse();
     }
     Ok(periods)
+}
+
+/// Why a time that is there cannot be read, be it along an axis or beside all; none if there is none.
+fn unread_time(planning: &Planning<'_>, variable: &Variable, axes: &[Axis]) -> Option<Rejection> {
+    let along = axes.iter().zip(&variable.dimensions);
+    let along = along.filter(|(axis, _)| axis.role == Role::Time);
+    let along = along.filter_map(|(_, dimension)| dimension.name.as_deref());
+    let beside = variable.attributes.text("coordinates").unwrap_or_default();
+    let beside = beside.split_whitespace();
+    planning.unread(along.chain(beside.filter(|name| name.eq_ignore_ascii_case("time"))))
 }
 
 /// Stamps in the order of time, and whether the file has them the other way round.

@@ -270,7 +270,7 @@ async fn the_profile_is_asked_again_and_a_layer_of_quality_is_refused() {
 }
 
 /// Two depths: those of the second come in the other order of time.
-fn deep() -> Own {
+pub(crate) fn deep() -> Own {
     let own = Own::with(PLAIN);
     own.edit("sst/.zarray", |it| {
         it["shape"] = json!([3, 2, 6, 8]);

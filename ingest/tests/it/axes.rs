@@ -322,6 +322,29 @@ async fn labels_at_corners_with_bounds_land_where_these_say() {
     );
 }
 
+/// Bounds that are there say where cells are: what is no two numbers a cell is not taken for none.
+#[tokio::test]
+async fn bounds_of_another_shape_are_refused_but_for_a_time_before_the_rest() {
+    let edges = [45.0, 90.0, 0.0, 45.0, -45.0, 0.0, -90.0, -45.0];
+    let file = |dimensions: &[&'static str], numbers: Vec<f64>| {
+        MadeFile::sst(2)
+            .but("lat", |v| v.text("bounds", "lat_bnds"))
+            .with(Made::new("lat_bnds", dimensions, Values::Doubles(numbers)))
+    };
+    let turned = file(&["two", "lat"], edges.to_vec());
+    assert_refused(&turned, &["lat: ", "\"lat_bnds\"", "[2, 4]", "the grid"]).await;
+    let letters = Values::Bytes(vec![0; 4]);
+    let plain = turned.with(Made::new("lat_bnds", &["lat"], letters));
+    assert_refused(&plain, &["lat: ", "\"lat_bnds\"", "int8", "[4]"]).await;
+    let repeated = file(&["time", "lat", "two"], edges.repeat(2));
+    let told = assumed(&land(&repeated).await);
+    let is_told = |line: &String| line.contains("\"lat_bnds\" have more dimensions");
+    assert!(told.iter().any(is_told), "{told:?}");
+    // They are read: what are no cells of the labels is refused.
+    let narrow = file(&["time", "lat", "two"], vec![1.0; 16]);
+    assert_refused(&narrow, &["lat_bnds: ", "no cells side by side"]).await;
+}
+
 /// A Gaussian grid is evened out, by how much is told, and what is farther from even is refused.
 #[tokio::test]
 async fn latitudes_that_are_not_quite_even_are_told_of() {

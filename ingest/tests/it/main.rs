@@ -5,6 +5,8 @@
 
 mod attached;
 mod attached_again;
+mod attached_bounds;
+mod attached_moved;
 mod attached_shards;
 mod attached_web;
 mod attributes;

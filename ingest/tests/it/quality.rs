@@ -78,6 +78,11 @@ async fn a_valid_range_is_of_stored_numbers_or_of_values_by_its_type() {
         ],
         // No stored number of 16 bits is a half: these are values.
         vec![("valid_range", Says::Doubles(&[9.5, 15.5]))],
+        vec![("valid_range", Says::Text("10.0 15.0"))],
+        vec![
+            ("valid_min", Says::Text("10.0")),
+            ("valid_max", Says::Text("15.0")),
+        ],
     ] {
         let (values, assumptions) = landed(&packed(&range), None).await;
         assert_eq!(row(&values), days, "{range:?}");

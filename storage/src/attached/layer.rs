@@ -156,17 +156,20 @@ impl Layer {
             let encoded = fields::encode(&grid, &values, period)?;
             Ok((encoded.values_sha256 == digest).then_some(encoded.content))
         });
-        let encoded = encoded.await.map_err(|e| failed(Box::new(e)))?;
-        encoded.ok_or_else(|| {
-            failed(Failure {
-                place: format!("{} step {period}", attachment.place()),
-                reason: format!(
-                    "the store has changed since it was attached: run `fluxglobe attach --refresh {}`",
-                    place.product
-                ),
-                cause: Cause::Content,
-            })
-        })
+        if let Some(content) = encoded.await.map_err(|e| failed(Box::new(e)))? {
+            return Ok(content);
+        }
+        // Where a store is gone, each of its chunks is not there, which may mean no data.
+        let gone = self.held.source.gone(&attachment, &reference).await;
+        let changed = || Failure {
+            place: format!("{} step {period}", attachment.place()),
+            reason: format!(
+                "the store has changed since it was attached: run `fluxglobe attach --refresh {}`",
+                place.product
+            ),
+            cause: Cause::Content,
+        };
+        Err(failed(gone.unwrap_or_else(changed)))
     }
 
     async fn attachment(&self, place: &Place, digest: Digest) -> Result<Arc<Attachment>> {

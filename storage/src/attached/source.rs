@@ -17,4 +17,10 @@ pub trait Source: std::fmt::Debug + Send + Sync {
         attachment: &Arc<Attachment>,
         reference: &Reference,
     ) -> Result<Vec<f32>, Failure>;
+
+    /// Why there is no store any more where an attachment says: its values are then lost, and not changed. None where there is one,
+    /// and where that is not known.
+    async fn gone(&self, _attachment: &Attachment, _reference: &Reference) -> Option<Failure> {
+        None
+    }
 }

@@ -9,7 +9,7 @@ use contract::key::ObjectKey;
 use contract::kind::Vouched;
 use contract::time::Period;
 use object_store::path::Path;
-use storage::attached::{Attachment, Failure, Reference, Source, StoreKind};
+use storage::attached::{Attachment, Cause, Failure, Reference, Source, StoreKind};
 use storage::{Store, fields};
 
 const GRID: Grid = Grid {
@@ -33,6 +33,29 @@ impl Source for Fixed {
         _reference: &Reference,
     ) -> Result<Vec<f32>, Failure> {
         Ok(self.0.clone())
+    }
+}
+
+/// A store of others that is gone: none of its chunks is there, which means no data.
+#[derive(Debug)]
+struct Gone;
+
+#[async_trait]
+impl Source for Gone {
+    async fn values(
+        &self,
+        _attachment: &Arc<Attachment>,
+        _reference: &Reference,
+    ) -> Result<Vec<f32>, Failure> {
+        Ok(vec![f32::NAN; GRID.cell_count()])
+    }
+
+    async fn gone(&self, attachment: &Attachment, reference: &Reference) -> Option<Failure> {
+        Some(Failure {
+            place: format!("step {}, {}", reference.period, attachment.place()),
+            reason: "its store is no longer there".to_owned(),
+            cause: Cause::Content,
+        })
     }
 }
 
@@ -108,6 +131,17 @@ async fn other_values_than_those_of_the_name_never_come_out() {
                 .is_err()
         );
     }
+}
+
+#[tokio::test]
+async fn a_store_that_is_gone_has_not_changed() {
+    let (store, key, _field) = attached().await;
+    let layered = store.with_attached(Arc::new(Gone));
+    let error = layered.get(&key).await.unwrap_err().to_string();
+    assert!(
+        error.contains("no longer there") && !error.contains("--refresh"),
+        "{error}"
+    );
 }
 
 #[tokio::test]

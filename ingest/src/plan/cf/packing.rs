@@ -34,6 +34,8 @@ pub(crate) struct Packing {
     /// Stored signed integers that are meant unsigned: what to add to negative ones.
     unsigned_wrap: Option<f64>,
     is_float32: bool,
+    /// The text of a valid range that is none, with its name; [`Packing::checked`] refuses it: values would be taken that are none.
+    unread: Option<String>,
     /// What was taken for granted, if the file leaves it open.
     pub(crate) assumption: Option<String>,
 }
@@ -77,6 +79,7 @@ impl From<&StoredPacking> for Packing {
             valid_values: range(stored.valid_values),
             unsigned_wrap: stored.unsigned_wrap.map(NumberBits::number),
             is_float32: stored.is_float32,
+            unread: None,
             assumption: None,
         }
     }
@@ -131,15 +134,17 @@ impl Packing {
             valid_values: ANY,
             unsigned_wrap,
             is_float32: variable.kind == Kind::Float(4),
+            unread: None,
             assumption: None,
         };
+        let pair = packing.numbers_of_range(variable, "valid_range", 2);
         let bounds = [("valid_min", 0, false), ("valid_max", 1, true)];
         for (alone, place, is_upper) in bounds {
-            let pair = attributes.numbers("valid_range").filter(|r| r.len() == 2);
-            let (name, number) = match (pair, attributes.number(alone)) {
-                (Some(pair), _) => ("valid_range", pair[place]),
-                (None, Some(number)) => (alone, number),
-                (None, None) => continue,
+            let single = packing.numbers_of_range(variable, alone, 1);
+            let (name, number) = match (&pair, single) {
+                (Some(pair), _) if pair.len() == 2 => ("valid_range", pair[place]),
+                (_, Some(single)) => (alone, single[0]),
+                (_, None) => continue,
             };
             if !number.is_nan() {
                 packing.bound(variable, name, number, is_upper);
@@ -151,24 +156,61 @@ impl Packing {
     /// This, if values can be had by it.
     ///
     /// # Errors
-    /// `Values` if the scale is zero, or scale or offset are no finite number.
+    /// `Values` if the scale is zero, scale or offset are no finite number, or the valid range is a text that is none.
     pub(crate) fn checked(self, variable: &Variable) -> Result<Self, Rejection> {
         let (scale, offset) = (self.scale, self.offset);
-        if scale.is_finite() && scale != 0.0 && offset.is_finite() {
-            return Ok(self);
+        let refused = |what: &str, own: &str| {
+            let detail = format!(
+                "has {what}, which cannot be; correct {own} in the file, or state {own} in a profile where it is a grid"
+            );
+            Err(Rejection::new(RejectReason::Values, &variable.name, detail))
+        };
+        if !(scale.is_finite() && scale != 0.0 && offset.is_finite()) {
+            let what = format!("scale_factor {scale} and add_offset {offset}");
+            return refused(&what, "them");
         }
-        let detail = format!(
-            "has scale_factor {scale} and add_offset {offset}, which cannot be; correct them in the file, or state them in a profile where it is a grid"
-        );
-        Err(Rejection::new(RejectReason::Values, &variable.name, detail))
+        if let Some(unread) = &self.unread {
+            return refused(unread, "the valid range");
+        }
+        Ok(self)
     }
 
     /// Only these values (unpacked, in the file's unit) are valid, whatever the file says.
     pub(crate) fn with_valid_values(mut self, low: f64, high: f64) -> Self {
         self.valid_stored = ANY;
         self.valid_values = (low, high);
+        self.unread = None;
         self.assumption = None;
         self
+    }
+
+    /// The numbers of an attribute of the valid range, at least one; none if it has none. A text that is not `count` numbers is noted.
+    fn numbers_of_range(
+        &mut self,
+        variable: &Variable,
+        name: &str,
+        count: usize,
+    ) -> Option<Vec<f64>> {
+        let found = numbers(variable, name).filter(|all| !all.is_empty());
+        let text = variable.attributes.text(name).unwrap_or_default();
+        if text.is_empty() || !variable.is_numeric() {
+            return found;
+        }
+        let Some(found) = found.filter(|all| all.len() == count) else {
+            self.unread
+                .get_or_insert_with(|| format!("{name} {text:?}"));
+            return None;
+        };
+        // A bound of more digits than values have is the nearest one of theirs.
+        let is_float32 = self.is_float32;
+        let own = |number: f64| {
+            if is_float32 {
+                f64::from(number as f32)
+            } else {
+                number
+            }
+        };
+        Some(found.into_iter().map(own).collect())
     }
 
     /// Takes one bound of the valid range.
@@ -176,9 +218,9 @@ impl Packing {
         let speaks = speaks(variable, name, number);
         if speaks == Speaks::Unclear {
             let kind = variable.attributes.kind(name);
-            let kind = kind.map_or_else(String::new, |kind| format!(" is {}, which", kind.name()));
+            let kind = kind.map_or_else(|| "text".to_owned(), Kind::name);
             self.assumption = Some(format!(
-                "{}: {name}{kind} is neither the type of its stored numbers ({}) nor that of scale_factor; taken for stored numbers",
+                "{}: {name} is {kind}, which is neither the type of its stored numbers ({}) nor that of scale_factor; taken for stored numbers",
                 variable.name,
                 variable.kind.name()
             ));
@@ -273,10 +315,27 @@ pub(crate) fn as_stored(kind: Kind, number: f64) -> f64 {
 /// Of which numbers a bound of the valid range speaks.
 fn speaks(variable: &Variable, name: &str, number: f64) -> Speaks {
     let attributes = &variable.attributes;
-    let (Some(kind), Some(unpacked)) = (attributes.kind(name), unpacked_kind(attributes)) else {
+    let Some(unpacked) = unpacked_kind(attributes) else {
         return Speaks::OfStored;
     };
     let is_float = |kind| matches!(kind, Kind::Float(_));
+    // What no stored integer can be is a value.
+    let beyond = match variable.kind {
+        Kind::Integer(bytes) | Kind::Unsigned(bytes) => {
+            number.abs() >= 2f64.powi(8 * i32::from(bytes))
+        }
+        _ => false,
+    };
+    let Some(kind) = attributes.kind(name) else {
+        // A text has no type of its own: written as no integer is, it is of no stored integers.
+        let text = attributes.text(name).unwrap_or_default();
+        let is_of_values = beyond || text.contains(['.', 'e', 'E']);
+        return if is_of_values && !is_float(variable.kind) {
+            Speaks::OfValues
+        } else {
+            Speaks::Unclear
+        };
+    };
     // A text has no type of its own: what is no type of stored integers is that of values.
     if is_scaled_by_text(attributes) && is_float(kind) && !is_float(variable.kind) {
         return Speaks::OfValues;
@@ -287,13 +346,6 @@ fn speaks(variable: &Variable, name: &str, number: f64) -> Speaks {
     if !is_float(kind) || is_float(variable.kind) {
         return Speaks::OfStored;
     }
-    // What no stored integer can be is a value.
-    let beyond = match variable.kind {
-        Kind::Integer(bytes) | Kind::Unsigned(bytes) => {
-            number.abs() >= 2f64.powi(8 * i32::from(bytes))
-        }
-        _ => false,
-    };
     if number.fract() != 0.0 || beyond {
         return Speaks::OfValues;
     }
@@ -416,6 +468,75 @@ mod tests {
             (25.0, None)
         );
         assert!(packing.value(4100.0).is_nan());
+    }
+
+    #[test]
+    fn a_valid_range_that_is_written_as_text_counts_and_what_is_no_numbers_is_refused() {
+        let with = |mut own: Variable, texts: &[(&str, &str)]| {
+            for (name, text) in texts {
+                let text = AttributeValue::Text((*text).to_owned());
+                own.attributes.0.insert((*name).to_owned(), text);
+            }
+            own
+        };
+        let float = |texts: &[(&str, &str)]| Packing::of(&with(variable(FLOAT, &[]), texts));
+        for texts in [
+            &[("valid_range", "0.0 100.1")][..],
+            &[("valid_range", "0, 100.1")],
+            &[("valid_min", " 0"), ("valid_max", "100.1")],
+        ] {
+            let packing = float(texts);
+            assert_eq!(packing.value(0.0), 0.0, "{texts:?}");
+            // In the precision of the values.
+            let most = f64::from(100.1f32);
+            assert_eq!(packing.value(most), most, "{texts:?}");
+            for outside in [-1.0, 100.2] {
+                assert!(packing.value(outside).is_nan(), "{outside} {texts:?}");
+            }
+            assert!(packing.checked(&variable(FLOAT, &[])).is_ok());
+        }
+        // Of packed values those that are written as no stored integer is, or that none can be; of others it is said.
+        let scale = [("scale_factor", FLOAT, &[0.01][..])];
+        let packed = |texts: &[(&str, &str)]| Packing::of(&with(variable(SHORT, &scale), texts));
+        for (text, is_of_values) in [
+            ("0.0 40.0", true),
+            ("0 1e1", true),
+            ("0 70000", false),
+            ("0 40", false),
+        ] {
+            let packing = packed(&[("valid_range", text)]);
+            assert_eq!(packing.value(900.0).is_nan(), text == "0 40", "{text}");
+            assert_eq!(packing.assumption.is_none(), is_of_values, "{text}");
+            let told = packing.assumption.unwrap_or_default();
+            assert!(
+                is_of_values || told.contains("valid_range is text"),
+                "{told}"
+            );
+        }
+        for (name, text) in [
+            ("valid_range", "0 to 100"),
+            ("valid_range", "0"),
+            ("valid_min", "0,5"),
+            ("valid_max", "0 100"),
+            ("valid_max", "none"),
+        ] {
+            let packing = float(&[(name, text)]);
+            let own = packing.clone().with_valid_values(0.0, 1.0);
+            let refused = packing.checked(&variable(FLOAT, &[])).unwrap_err();
+            assert!(
+                refused.detail.contains(name) && refused.detail.contains(text),
+                "{refused}"
+            );
+            assert!(
+                own.checked(&variable(FLOAT, &[])).is_ok(),
+                "a profile says it"
+            );
+        }
+        assert!(
+            float(&[("valid_min", "")])
+                .checked(&variable(FLOAT, &[]))
+                .is_ok()
+        );
     }
 
     /// Halves are 8 apart there: -9999 is stored as -10000.
