@@ -46,6 +46,9 @@ again computes what has changed since.";
 #[derive(Debug, Subcommand)]
 pub(crate) enum DeriveWhat {
     /// Carbon accumulated in every cell since a start: what lifts and sinks the particles.
+    ///
+    /// A step without data adds nothing: a cell that has data later is at 0 before its first, and one that has none since the start holds none.
+    /// How many steps a sum holds is stored beside it, and `fluxglobe stats point` prints it.
     Accumulated {
         /// Product, a carbon flux.
         #[arg(long)]
