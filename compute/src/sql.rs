@@ -7,6 +7,7 @@
 mod about;
 mod analysis;
 mod axes;
+mod batches;
 mod budget;
 mod columns;
 mod copies;

@@ -30,7 +30,7 @@ use super::tables::Tables;
 use super::told::{overdue, told};
 use super::worked_out::AnswerFunction;
 use super::yielding::Yielding;
-use super::{analysis, budget, joined, statistics, substituted};
+use super::{analysis, batches, budget, joined, statistics, substituted};
 use crate::expression::udf::number_functions;
 use crate::{ComputeError, Engine};
 
@@ -194,6 +194,7 @@ impl Sql {
             })?;
         joined::check(&plan, text.len())?;
         substituted::check(&plan)?;
+        batches::check(&plan, text.len())?;
         context.execute_logical_plan(plan).await.map_err(failed)
     }
 
