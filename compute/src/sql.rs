@@ -17,6 +17,7 @@ mod mean_weighted;
 mod named;
 mod pinned;
 mod place;
+mod planning;
 mod product_table;
 mod reads;
 mod rows;
