@@ -159,6 +159,7 @@ impl Plan {
         fits::check(&job)?;
         matched::pressures_of_a_kind(&inputs, &request.how)?;
         matched::places_of_a_kind(&inputs)?;
+        matched::codes_are_compared(&inputs, &request.how)?;
         if let Computation::Regrid { method, .. } = request.how {
             check_regridded(first, method)?;
         }

@@ -7,6 +7,7 @@
 mod about;
 mod analysis;
 mod axes;
+mod batches;
 mod budget;
 mod columns;
 mod copies;
@@ -16,6 +17,7 @@ mod mean_weighted;
 mod named;
 mod pinned;
 mod place;
+mod planning;
 mod product_table;
 mod reads;
 mod rows;

@@ -1,5 +1,5 @@
-//! What may be summed over area and time, a flux of carbon and no extreme of one; and what may be averaged, no days of a year that goes round
-//! and, on the way to another grid, no codes.
+//! What may be summed over area and time, a flux of carbon and no extreme of one; and what may be averaged, no codes and no days of a year that
+//! goes round.
 
 use std::collections::BTreeSet;
 
@@ -110,14 +110,32 @@ fn passed_on(manifest: &Manifest) -> Vec<&ComputedInput> {
 
 /// # Errors
 /// Of the phase of the year's wave, on whichever grid and wherever it comes from: 31 December and 1 January are next to each other, and the mean of their numbers lies
-/// in July.
+/// in July. And of what [`check_averaged_in_a_cell`] refuses.
 pub(crate) fn check_averaged(manifest: &Manifest) -> Result<(), ComputeError> {
+    check_averaged_in_a_cell(manifest)?;
     if !manifest.quantity.is_day_of_year() {
         return Ok(());
     }
     let reason = "it holds days of the year, which go round: the mean of 1 January and 31 December is no day in July; ask for single places";
     let refused = ContractError::invalid("product", manifest.product.as_str(), reason);
     Err(refused.into())
+}
+
+/// The same over time alone.
+///
+/// # Errors
+/// Of codes, whose mean is the code of something else or of nothing.
+pub(crate) fn check_averaged_in_a_cell(manifest: &Manifest) -> Result<(), ComputeError> {
+    let Some(code) = manifest.quantity.flags().first() else {
+        return Ok(());
+    };
+    let product = manifest.product.as_str();
+    let reason = format!(
+        "it holds codes, and the mean of two is the code of something else: ask for single places and steps, for the region {product}:{code} of another \
+         product, or for the share of a code, which fluxglobe derive --expr \"CASE WHEN code = {code} THEN 1 ELSE 0 END\" makes",
+        code = code.value,
+    );
+    Err(ContractError::invalid("product", product, reason).into())
 }
 
 /// # Errors
@@ -147,7 +165,8 @@ pub(crate) fn usual_regridding(manifest: &Manifest) -> Regridding {
     }
 }
 
-fn holds_codes(manifest: &Manifest) -> bool {
+/// Are its values those of a mask whose file says what they mean?
+pub(crate) fn holds_codes(manifest: &Manifest) -> bool {
     !manifest.quantity.flags().is_empty()
 }
 
@@ -263,5 +282,17 @@ mod tests {
         let refused = check_averaged(&phase).unwrap_err().to_string();
         assert!(refused.contains("which go round"), "{refused}");
         check_averaged(&landed(in_days("first_day_of_ice"))).unwrap();
+        check_averaged_in_a_cell(&phase).unwrap();
+    }
+
+    #[test]
+    fn codes_have_no_mean_over_an_area_or_over_time() {
+        let mask = landed(mask());
+        for refused in [check_averaged(&mask), check_averaged_in_a_cell(&mask)] {
+            let refused = refused.unwrap_err().to_string();
+            assert!(refused.contains("the region p:5"), "{refused}");
+            assert!(refused.contains("CASE WHEN code = 5"), "{refused}");
+        }
+        check_averaged(&landed(Quantity::CarbonFlux)).unwrap();
     }
 }

@@ -11,6 +11,7 @@ use contract::time::Period;
 use crate::point::point_series_of;
 use crate::reduce::statistics_of;
 use crate::stats::region_series_of;
+use crate::summed::check_averaged_in_a_cell;
 use crate::{ComputeError, Engine};
 
 /// Share of a region's sea, or of a line, below which a step is told of, percent.
@@ -130,7 +131,7 @@ impl CoveredMean {
 /// The series of a version of a product, without steps that hold data over less of a region's sea, or of a line, than `least`.
 ///
 /// # Errors
-/// No step in the asked period, a place, region or line outside the grid, and what reading meets.
+/// No step in the asked period, a place, region or line outside the grid, codes of a mask, and what reading meets.
 pub(crate) async fn series(
     engine: &Engine,
     (manifest, id): Version<'_>,
@@ -154,6 +155,7 @@ pub(crate) async fn series(
     };
     match query {
         SeriesQuery::Cell { place, .. } => {
+            check_averaged_in_a_cell(manifest)?;
             let found = point_series_of(engine, manifest, id.clone(), *place).await?;
             read.place.cell = Some(found.cell);
             for step in found.series {

@@ -8,6 +8,8 @@ use contract::manifest::{Manifest, Step};
 use contract::quantity::Quantity;
 use contract::time::{Period, TimeMs};
 
+use crate::expression::computed_with;
+use crate::summed::holds_codes;
 use crate::{ComputeError, shared_grid};
 
 /// An input as it is read.
@@ -84,6 +86,32 @@ pub(super) fn pressures_of_a_kind(inputs: &[Input], how: &Computation) -> Result
         ))),
         _ => Ok(()),
     }
+}
+
+/// Codes are compared, and no value of theirs goes into that of a result: twice a code is the code of something else, and whatever comes out
+/// no longer says that no mean is to be taken of it.
+///
+/// # Errors
+/// One does: of which product, and how a code is compared.
+pub(super) fn codes_are_compared(inputs: &[Input], how: &Computation) -> Result<(), ComputeError> {
+    let Computation::Expression { expression } = how else {
+        return Ok(());
+    };
+    let names: Vec<&str> = inputs.iter().map(|input| input.name.as_str()).collect();
+    let computed_with = computed_with(expression, &names);
+    let of_codes = |input: &&Input| holds_codes(&input.manifest);
+    let mut of_codes = inputs.iter().filter(of_codes);
+    let Some(input) = of_codes.find(|input| computed_with.contains(&input.name)) else {
+        return Ok(());
+    };
+    let code = input.manifest.quantity.flags().first();
+    Err(refused(format!(
+        "{} holds codes, and what is computed with them is the code of something else or of nothing: compare them, as in \
+         CASE WHEN \"{}\" = {} THEN 1 ELSE 0 END",
+        input.manifest.product,
+        input.name,
+        code.map_or(1, |code| code.value),
+    )))
 }
 
 /// Names of the CO₂ flux (`derive co2-flux`) say what a product is of: water or air, the skin or what lies below. Where products say it as

@@ -72,8 +72,9 @@ impl Questions {
     }
 
     async fn columns(&self, text: &str) -> Result<SchemaRef, Status> {
-        let _turn = self.turn()?;
-        self.sql.columns(text).await.map_err(|error| status(&error))
+        let turn = self.turn()?;
+        let columns = self.sql.columns_in_turn(text, Some(turn)).await;
+        columns.map_err(|error| status(&error))
     }
 
     /// What a question answers, and the ticket that has it answered: its text.

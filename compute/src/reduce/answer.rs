@@ -11,7 +11,7 @@ use contract::quantity::{Display, Quantity};
 use contract::statistics::{
     Percentile, Statistic, StatisticNote, StatisticsAnswer, StatisticsQuery, StatisticsRow,
 };
-use contract::time::Period;
+use contract::time::{Period, TimeStep};
 use cube::Values;
 use cube::scale::Scale;
 use futures::future::BoxFuture;
@@ -25,7 +25,7 @@ use super::scales::{Extremes, between, small_bins};
 use super::tasks::Version;
 use super::weighed::Weighed;
 use crate::budget::rows::coverage_percent;
-use crate::summed::check_averaged;
+use crate::summed::{check_averaged, check_averaged_in_a_cell};
 use crate::{ComputeError, Engine, catalogue};
 
 /// Statistics of the newest version of a product.
@@ -55,8 +55,12 @@ pub fn statistics_of<'a>(
                 ..
             }
         );
-        if !is_one_cell && !query.statistics.iter().all(counts) {
-            check_averaged(manifest)?;
+        if !query.statistics.iter().all(counts) {
+            match (is_one_cell, query.step) {
+                (false, _) => check_averaged(manifest)?,
+                (true, TimeStep::Native) => {}
+                (true, _) => check_averaged_in_a_cell(manifest)?,
+            }
         }
         let (window, inside) = manifest.steps_inside(query.from, query.to)?;
         let periods: Vec<Period> = manifest.steps.iter().map(|step| step.period).collect();

@@ -24,11 +24,11 @@ const JOINING: [&str; 11] = [
     "struct",
 ];
 /// One whose value may be twice as large as its argument: hexadecimal digits of bytes.
-const DOUBLING: &str = "encode";
+pub(super) const DOUBLING: &str = "encode";
 /// Aggregates of rows as one value, which may already be as large as the limit of memory lets them.
-const GATHERING: [&str; 2] = ["array_agg", "string_agg"];
+pub(super) const GATHERING: [&str; 2] = ["array_agg", "string_agg"];
 /// What those count as: texts so often as long as one of a row.
-const GATHERED: f64 = 256.0;
+pub(super) const GATHERED: f64 = 256.0;
 
 /// Longest text of a product's tables, bytes, generously.
 const STORED_BYTES: usize = 1024;

@@ -18,19 +18,20 @@ use datafusion::logical_expr::AggregateUDF;
 use datafusion::physical_plan::execute_stream;
 use datafusion::prelude::SessionConfig;
 use futures::future::BoxFuture;
-use tokio::time::{Instant, timeout_at};
+use tokio::time::Instant;
 
 use super::limits::SqlLimits;
 use super::mean_weighted::MeanWeighted;
 use super::pinned::Pinned;
+use super::planning::Planning;
 use super::rows::BATCH_ROWS;
 use super::running::{Rows, Turn};
 use super::statement::{LARGE, statement};
 use super::tables::Tables;
-use super::told::{overdue, told};
+use super::told::told;
 use super::worked_out::AnswerFunction;
 use super::yielding::Yielding;
-use super::{analysis, budget, joined, statistics, substituted};
+use super::{analysis, batches, budget, joined, statistics, substituted};
 use crate::expression::udf::number_functions;
 use crate::{ComputeError, Engine};
 
@@ -95,10 +96,12 @@ impl Sql {
     /// The same, holding a turn until the work on it ends.
     pub(crate) async fn ask_in_turn(&self, text: &str, turn: Turn) -> Result<Rows, ComputeError> {
         let deadline = Instant::now() + self.limits.time;
-        // A plan may take long by itself: it is made where it can be left.
         let (own, text) = (self.clone(), text.to_owned());
-        let planning = Aborted(tokio::spawn(async move { own.planned(&text).await }));
-        let planned = self.in_time(deadline, planning).await?;
+        let planning = Planning::start(async move {
+            let planned = own.planned(&text).await?;
+            Ok((planned, turn))
+        });
+        let (planned, turn) = planning.until(deadline, self.limits).await?;
         Ok(Rows::start(
             planned.schema,
             planned.stream,
@@ -108,21 +111,24 @@ impl Sql {
         ))
     }
 
-    /// Columns of the answer to a question, which is not worked on.
+    /// Columns of the answer to a question, which is not worked on, holding a turn until its plan ends.
     ///
     /// # Errors
     /// As [`Sql::ask`].
-    pub fn columns<'a>(&'a self, text: &'a str) -> BoxFuture<'a, Result<SchemaRef, ComputeError>> {
-        Box::pin(async move {
-            let deadline = Instant::now() + self.limits.time;
-            let (own, text) = (self.clone(), text.to_owned());
-            let planning = Aborted(tokio::spawn(async move {
-                let (context, tables) = own.context().await?;
-                let frame = own.frame(&context, &tables, &text).await?;
-                Ok(Arc::clone(frame.schema().inner()))
-            }));
-            self.in_time(deadline, planning).await
-        })
+    pub(crate) async fn columns_in_turn(
+        &self,
+        text: &str,
+        turn: Turn,
+    ) -> Result<SchemaRef, ComputeError> {
+        let deadline = Instant::now() + self.limits.time;
+        let (own, text) = (self.clone(), text.to_owned());
+        let planning = Planning::start(async move {
+            let _turn = turn;
+            let (context, tables) = own.context().await?;
+            let frame = own.frame(&context, &tables, &text).await?;
+            Ok(Arc::clone(frame.schema().inner()))
+        });
+        planning.until(deadline, self.limits).await
     }
 
     /// Every table there is, and its columns where they are wanted.
@@ -146,17 +152,6 @@ impl Sql {
             listed.push((name, columns.unwrap_or_else(|| Arc::new(Schema::empty()))));
         }
         Ok(listed)
-    }
-
-    async fn in_time<T>(
-        &self,
-        deadline: Instant,
-        mut work: Aborted<Result<T, ComputeError>>,
-    ) -> Result<T, ComputeError> {
-        match timeout_at(deadline, &mut work.0).await {
-            Ok(ended) => ended.map_err(|e| ComputeError::inconsistent("the query engine", e))?,
-            Err(_elapsed) => Err(overdue(self.limits)),
-        }
     }
 
     async fn planned(&self, text: &str) -> Result<Planned, ComputeError> {
@@ -194,6 +189,7 @@ impl Sql {
             })?;
         joined::check(&plan, text.len())?;
         substituted::check(&plan)?;
+        batches::check(&plan, text.len())?;
         context.execute_logical_plan(plan).await.map_err(failed)
     }
 
@@ -252,15 +248,6 @@ impl Sql {
         ComputeError::Sql {
             reason: format!("{reason}; {advice}"),
         }
-    }
-}
-
-/// Work that ends when nobody waits for it any more.
-struct Aborted<T>(tokio::task::JoinHandle<T>);
-
-impl<T> Drop for Aborted<T> {
-    fn drop(&mut self) {
-        self.0.abort();
     }
 }
 

@@ -1,8 +1,11 @@
 //! Products computed from others: the values of the formula in every cell, the same bits however the work is cut, and what
 //! is refused.
 
+use compute::analysis::analyse;
 use compute::computed::{Outcome, Request, RequestedInput, compute};
+use compute::reduce::statistics;
 use compute::{ComputeError, Engine, ErrorClass, point_series};
+use contract::analysis::{AnalysisOptions, AnalysisPart, SeriesQuery};
 use contract::computed::{Computation, Matching, Regridding};
 use contract::earth::Earth;
 use contract::grid::{Grid, LonLatDeg};
@@ -97,6 +100,23 @@ fn asked(expression: &str, inputs: &[&str]) -> Request {
         from: None,
         to: None,
     }
+}
+
+/// What the values of a mask are.
+fn surface() -> Quantity {
+    let flag = |value, meaning: &str| Flag {
+        value,
+        meaning: meaning.to_owned(),
+    };
+    let words = OpenWords {
+        name: "surface".to_owned(),
+        unit: "1".to_owned(),
+        title: "Surface".to_owned(),
+        range: None,
+        flags: vec![flag(0, "sea"), flag(1, "coast"), flag(2, "land")],
+        is_standard_name: false,
+    };
+    Quantity::Open(OpenQuantity::new(words).unwrap())
 }
 
 async fn computed(engine: &Engine, request: &Request) -> Outcome {
@@ -359,19 +379,7 @@ async fn what_is_brought_to_another_grid_holds_what_its_source_holds_now_and_kee
 async fn codes_are_brought_to_another_grid_by_the_nearest_alone() {
     let (_folder, store) = folder_store();
     land_inputs(&store).await;
-    let flag = |value, meaning: &str| Flag {
-        value,
-        meaning: meaning.to_owned(),
-    };
-    let words = OpenWords {
-        name: "surface".to_owned(),
-        unit: "1".to_owned(),
-        title: "Surface".to_owned(),
-        range: None,
-        flags: vec![flag(0, "sea"), flag(1, "coast"), flag(2, "land")],
-        is_standard_name: false,
-    };
-    let surface = Quantity::Open(OpenQuantity::new(words).unwrap());
+    let surface = surface();
     let coarse = Grid {
         rows: 9,
         cols: 18,
@@ -410,6 +418,65 @@ async fn codes_are_brought_to_another_grid_by_the_nearest_alone() {
     let error = compute(&engine, &mixed, &|_| ()).await.unwrap_err();
     let advice = "fluxglobe derive regrid --product mask --like wind --method nearest";
     assert!(error.to_string().contains(advice), "{error}");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn codes_are_compared_in_expressions_and_neither_computed_with_nor_averaged() {
+    let (_folder, store) = folder_store();
+    let codes: Vec<f32> = (0..FOUR_DEGREES.cell_count())
+        .map(|cell| (cell % 3) as f32)
+        .collect();
+    let year = [(Period::year(2000).unwrap(), codes)];
+    land(&store, &product("mask"), surface(), FOUR_DEGREES, &year).await;
+    let engine = Engine::in_process(store.clone(), parts(1));
+    let request = |expression| Request {
+        target: product("share"),
+        quantity: Some(Quantity::open("share", "1", "Share").unwrap()),
+        ..asked(expression, &["mask"])
+    };
+    for expression in [
+        "mask + 0",
+        "mask * 1",
+        "2 * coalesce(mask, 0)",
+        "CASE WHEN mask > 0 THEN mask ELSE 0 END",
+    ] {
+        let error = compute(&engine, &request(expression), &|_| ()).await;
+        let error = error.unwrap_err();
+        assert_eq!(error.class(), ErrorClass::BadRequest, "{error:?}");
+        let told = "mask holds codes";
+        assert!(error.to_string().contains(told), "{expression}: {error}");
+    }
+    let compared = request("CASE WHEN mask = 1 OR mask = 2 THEN 1 ELSE 0 END");
+    let share = computed(&engine, &compared).await.manifest;
+    let found = values(&store, &share, 0).await;
+    let is_one: Vec<bool> = found[..3].iter().map(|share| *share > 0.5).collect();
+    assert_eq!(is_one, [false, true, true]);
+    let mean = |of: &str| StatisticsQuery {
+        product: product(of),
+        ..crate::statistics::asked(
+            crate::statistics::area("-60,-20,60,20"),
+            "mean",
+            TimeStep::Native,
+        )
+    };
+    let found = statistics(&engine, &mean("share")).await.unwrap();
+    let found = found.rows[0].values["mean"].unwrap();
+    assert!((0.5..0.8).contains(&found), "{found}");
+    let error = statistics(&engine, &mean("mask")).await;
+    let error = error.unwrap_err().to_string();
+    assert!(error.contains("it holds codes"), "{error}");
+    let mask = manifests::latest(&store, &product("mask")).await;
+    let mask = mask.unwrap().unwrap();
+    let at = SeriesQuery::Cell {
+        product: product("mask"),
+        place: LonLatDeg::new(5.0, 5.0).unwrap(),
+        from: None,
+        to: None,
+    };
+    let options = AnalysisOptions::new(AnalysisPart::ALL.to_vec()).unwrap();
+    let error = analyse(&engine, (&mask, &mask.id()), &at, &options).await;
+    let error = error.unwrap_err().to_string();
+    assert!(error.contains("it holds codes"), "{error}");
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -595,7 +662,7 @@ async fn steps_without_data_are_answered_as_such() {
             TimeStep::Native,
         )
     };
-    let answer = compute::reduce::statistics(&engine, &query).await.unwrap();
+    let answer = statistics(&engine, &query).await.unwrap();
     for row in answer.rows {
         assert_eq!((row.values["mean"], row.values["count"]), (None, Some(0.0)));
     }

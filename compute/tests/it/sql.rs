@@ -563,6 +563,80 @@ async fn texts_are_joined_and_those_that_would_double_without_end_are_refused() 
     }
 }
 
+#[tokio::test(flavor = "multi_thread")]
+async fn a_long_text_that_would_stand_in_every_row_is_refused_and_others_are_taken() {
+    let (_folder, store) = folder_store();
+    sst(&store).await;
+    let sql = sql_of(&Engine::in_process(store, parts(1)));
+    let long = format!("'{}'", "a".repeat(200 << 10));
+    let half = format!("'{}'", "a".repeat(20 << 10));
+    for text in [
+        format!("SELECT {long} FROM sst_test"),
+        format!("SELECT max({long}) FROM sst_test"),
+        format!("SELECT (SELECT {long}) FROM sst_test"),
+        format!("SELECT coalesce(CAST(value AS VARCHAR), {long}) FROM sst_test"),
+        format!("SELECT CASE WHEN value > 0 THEN {long} END FROM sst_test"),
+        format!("SELECT 1 FROM sst_test WHERE length({long} || CAST(value AS VARCHAR)) > 5"),
+        format!("SELECT x, value FROM sst_test, (VALUES ({long})) AS t(x)"),
+        format!("WITH t AS (SELECT {half} AS x) SELECT x, x AS y FROM t, sst_test"),
+        format!(
+            "SELECT value FROM sst_test WHERE value IN (SELECT length(concat({long}, value::text)) FROM sst_test)"
+        ),
+    ] {
+        let start: String = text.chars().take(60).collect();
+        let error = ask(&sql, &text).await.unwrap_err();
+        assert!(
+            matches!(error, ComputeError::Sql { .. }),
+            "{start}: {error}"
+        );
+        assert!(
+            error.to_string().contains("more than 256 MiB"),
+            "{start}: {error}"
+        );
+    }
+    let label = "'a label of ordinary length, as people write them'";
+    let listed: Vec<String> = (0..3000).map(|at| format!("'{at} K'")).collect();
+    let listed = listed.join(", ");
+    let columns: Vec<String> = (0..500)
+        .map(|at| format!("value + {at} AS v{at}"))
+        .collect();
+    let columns = columns.join(", ");
+    for (text, wanted) in [
+        (format!("SELECT length({long})"), "204800"),
+        (
+            format!("SELECT max(length(x)) FROM (VALUES ('b'), ({long})) AS t(x)"),
+            "204800",
+        ),
+        (
+            format!("SELECT count(*) FROM sst_test WHERE CAST(value AS VARCHAR) = {long}"),
+            "0",
+        ),
+        (
+            format!("SELECT count(*) FROM sst_test WHERE CAST(value AS VARCHAR) IN ({listed})"),
+            "0",
+        ),
+        (
+            format!("SELECT count(x) FROM (SELECT {label} AS x FROM sst_test)"),
+            "234000",
+        ),
+        (
+            format!("SELECT count(*) FROM (SELECT {columns} FROM sst_test)"),
+            "234000",
+        ),
+        (
+            "SELECT count(*) FROM products p, products q, products r".to_owned(),
+            "1",
+        ),
+        (
+            "SELECT string_agg(name, ', ') FROM products GROUP BY quantity".to_owned(),
+            "sst-test",
+        ),
+    ] {
+        let start: String = text.chars().take(60).collect();
+        assert_eq!(one(&sql, &text).await, wanted, "{start}");
+    }
+}
+
 /// Columns each of which is computed so of the one before.
 fn computed_of_computed(times: usize, computed: &str) -> String {
     let next = |at: usize| format!(", t{} AS (SELECT {computed} AS a FROM t{at})", at + 1);

@@ -32,6 +32,7 @@ An expression is computed in every cell of every period that its inputs have in 
 It is SQL's: + - * /, comparisons, AND OR NOT BETWEEN, CASE WHEN .. THEN .. ELSE .. END, abs sqrt power exp ln greatest
 least coalesce, and the functions of the air-sea flux that `fluxglobe derive functions` lists with their papers.
 Products are in SI units; a number with a unit is written unit(5, 'hPa'), and different units are never added.
+Codes of a mask are compared, as in CASE WHEN basin = 5 THEN flux ELSE 0 END, and never computed with.
 No data in an input is no data in the result, but where it stands in coalesce(ice, 0).
 An input whose months hold in all of their days is marked :containing, one of one year that holds in every year
 :climatology, one that holds always :any-time:
@@ -45,6 +46,9 @@ again computes what has changed since.";
 #[derive(Debug, Subcommand)]
 pub(crate) enum DeriveWhat {
     /// Carbon accumulated in every cell since a start: what lifts and sinks the particles.
+    ///
+    /// A step without data adds nothing: a cell that has data later is at 0 before its first, and one that has none since the start holds none.
+    /// How many steps a sum holds is stored beside it, and `fluxglobe stats point` prints it.
     Accumulated {
         /// Product, a carbon flux.
         #[arg(long)]

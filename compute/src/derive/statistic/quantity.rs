@@ -11,11 +11,15 @@ const DECADE: f64 = 10.0;
 /// The quantity of a statistic, and what its values are multiplied with: means stay what they are, differences are no
 /// temperatures or fluxes with a sign of their own any more, and are kept in the unit that people read. Of two products `second` is
 /// that of the other one.
+///
+/// # Errors
+/// A statistic of codes that takes a mean: that of two is the code of something else.
 pub(super) fn of(
     own: Quantity,
     second: Option<Quantity>,
     statistic: MapStatistic,
 ) -> Result<(Quantity, f64), ContractError> {
+    check_codes([Some(own), second], statistic)?;
     let display = own.display();
     let unit = plain_unit(display.unit);
     let (word, unit, says, factor) = match statistic {
@@ -80,6 +84,48 @@ pub(super) fn of(
     Ok((Quantity::open(&name, &unit, &title)?, factor))
 }
 
+/// A mean of codes is the code of something else.
+fn check_codes(of: [Option<Quantity>; 2], statistic: MapStatistic) -> Result<(), ContractError> {
+    let mut of_codes = of
+        .into_iter()
+        .flatten()
+        .filter(|quantity| !quantity.flags().is_empty());
+    let Some(codes) = of_codes.next().filter(|_| !is_of_codes(statistic)) else {
+        return Ok(());
+    };
+    let reason = format!(
+        "{} holds codes, which have none: there are count, coverage, min, max, percentiles, min-time and max-time of them, and any of the share of a \
+         code, which fluxglobe derive --expr \"CASE WHEN code = 1 THEN 1 ELSE 0 END\" makes",
+        codes.title()
+    );
+    let asked = statistic.to_string();
+    Err(ContractError::invalid("statistic", &asked, reason))
+}
+
+/// Does it count values, or is it one that was there, so that no mean is taken for it?
+fn is_of_codes(statistic: MapStatistic) -> bool {
+    match statistic {
+        MapStatistic::Count
+        | MapStatistic::Coverage
+        | MapStatistic::Min
+        | MapStatistic::Max
+        | MapStatistic::MinTime
+        | MapStatistic::MaxTime
+        | MapStatistic::Percentile(_) => true,
+        MapStatistic::Mean
+        | MapStatistic::Spread
+        | MapStatistic::Climatology
+        | MapStatistic::Anomaly
+        | MapStatistic::Amplitude
+        | MapStatistic::Phase
+        | MapStatistic::Trend
+        | MapStatistic::TrendPValue
+        | MapStatistic::LeastSquaresTrend
+        | MapStatistic::LeastSquaresTrendPValue
+        | MapStatistic::Correlation(_) => false,
+    }
+}
+
 /// What is said of a correlation, by a name of its own: which two go together is in the title.
 fn of_two(both: [Quantity; 2], of: CorrelationStatistic) -> Result<Quantity, ContractError> {
     let (word, says) = match of {
@@ -128,6 +174,8 @@ fn plain_unit(shown: &str) -> String {
 
 #[cfg(test)]
 mod tests {
+    use contract::quantity::{Flag, OpenQuantity, OpenWords};
+
     use super::*;
 
     #[test]
@@ -189,6 +237,32 @@ mod tests {
         let long = Quantity::open("long", "1", &"t".repeat(MAX_TITLE_BYTES)).unwrap();
         let found = of(long, CorrelationStatistic::PValue);
         assert_eq!(found.title(), "p value of the correlation");
+    }
+
+    #[test]
+    fn codes_have_no_statistic_that_a_mean_is_taken_for() {
+        let Quantity::Open(plain) = Quantity::open("ice_type", "1", "Kind of ice").unwrap() else {
+            panic!("a kind of ice is built in");
+        };
+        let flag = Flag {
+            value: 2,
+            meaning: "first_year_ice".to_owned(),
+        };
+        let words = OpenWords {
+            flags: vec![flag],
+            ..plain.words().clone()
+        };
+        let codes = Quantity::Open(OpenQuantity::new(words).unwrap());
+        for statistic in MapStatistic::ALL {
+            let found = super::of(codes, None, statistic);
+            assert_eq!(found.is_ok(), is_of_codes(statistic), "{statistic}");
+        }
+        let kept = super::of(codes, None, MapStatistic::Max).unwrap();
+        assert_eq!(kept, (codes, 1.0));
+        let coefficient = MapStatistic::Correlation(CorrelationStatistic::Coefficient);
+        let refused = super::of(Quantity::WindSpeed, Some(codes), coefficient);
+        let refused = refused.unwrap_err().to_string();
+        assert!(refused.contains("Kind of ice holds codes"), "{refused}");
     }
 
     #[test]
