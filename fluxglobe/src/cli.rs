@@ -303,7 +303,8 @@ pub(crate) struct Ingest {
     /// Product to land in, if not the profile's.
     #[arg(long, value_name = "PRODUCT")]
     pub(crate) product: Option<ProductId>,
-    /// Variable to land, where no profile is for the file and it holds several: any on a grid.
+    /// Variable to land, where no profile is for the file and it holds several: any on a grid. Of a file that a profile is for, the
+    /// one that it reads; for another give the profile that does.
     #[arg(long, value_name = "NAME", conflicts_with = "profile")]
     pub(crate) variable: Option<String>,
     /// One JSON object a file.
