@@ -40,7 +40,7 @@ pub(crate) async fn run(settings: &Settings, options: &Budget) -> Result<()> {
     match form {
         Form::Json => return progress::result(&serde_json::to_string_pretty(&answer)?),
         Form::Csv => progress::result(&csv(&answer)?)?,
-        Form::Table => progress::result(&tables::of(&answer).to_string())?,
+        Form::Table => progress::result(&tables::of(&answer).trim_fmt())?,
     }
     say_what(&answer);
     say_besides(&answer);
@@ -185,7 +185,7 @@ fn say_history(form: Form, answer: &BudgetHistory) -> Result<()> {
     match form {
         Form::Json => return progress::result(&serde_json::to_string_pretty(answer)?),
         Form::Csv => progress::result(&csv(answer)?)?,
-        Form::Table => progress::result(&tables::of_history(answer).to_string())?,
+        Form::Table => progress::result(&tables::of_history(answer).trim_fmt())?,
     }
     progress::say(&format!(
         "{} of {}, positive out of the sea, by the {} of {} versions that changed it",

@@ -96,7 +96,7 @@ async fn list(settings: &Settings, asked: &ObservationsAsked) -> Result<()> {
         "kind",
         "from",
         "to",
-        "last place",
+        "last lon, lat",
         "values",
         "properties",
     ]);
@@ -113,7 +113,7 @@ async fn list(settings: &Settings, asked: &ObservationsAsked) -> Result<()> {
             p.properties.join(" "),
         ]);
     }
-    progress::result(&table.to_string())?;
+    progress::result(&table.trim_fmt())?;
     warn();
     Ok(())
 }
@@ -185,7 +185,8 @@ async fn query(settings: &Settings, asked: &ObservationsAsked) -> Result<()> {
     let mut table = Table::new();
     table.load_preset(NOTHING);
     table.set_header([
-        "time", "dataset", "platform", "place", "depth m", "property", "value", "unit", "flag",
+        "time", "dataset", "platform", "lon, lat", "depth m", "property", "value", "unit",
+        "quality",
     ]);
     for o in rows {
         table.add_row([
@@ -197,10 +198,10 @@ async fn query(settings: &Settings, asked: &ObservationsAsked) -> Result<()> {
             o.property,
             format!("{}", o.value),
             o.unit,
-            o.quality.flag().to_string(),
+            o.quality.to_string(),
         ]);
     }
-    progress::result(&table.to_string())?;
+    progress::result(&table.trim_fmt())?;
     warn();
     Ok(())
 }

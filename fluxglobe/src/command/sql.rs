@@ -160,7 +160,7 @@ async fn table(mut rows: Rows, most: usize) -> Result<String> {
             own.set_cell_alignment(CellAlignment::Right);
         }
     }
-    progress::result(&table.to_string())?;
+    progress::result(&table.trim_fmt())?;
     Ok(if is_cut {
         format!("the first {count} rows: --max-rows shows more, --output FILE writes all")
     } else {

@@ -33,6 +33,9 @@ impl Form {
     }
 }
 
+/// Said of a place at which no step has a value: it is not told from a place that was meant otherwise.
+pub(super) const NOTHING_THERE: &str = "note: no step holds data at this place: it lies on land, or the product has a gap there; --lon is degrees east, --lat degrees north";
+
 /// Asks, draws and prints.
 pub(crate) async fn run(
     settings: &Settings,
@@ -51,7 +54,7 @@ pub(crate) async fn run(
     match form {
         Form::Json => return progress::result(&serde_json::to_string_pretty(&answer)?),
         Form::Csv => progress::result(&csv(&answer)?)?,
-        Form::Table => progress::result(&table(&answer).to_string())?,
+        Form::Table => progress::result(&table(&answer).trim_fmt())?,
     }
     progress::say(&format!(
         "{}, {}; cite {}",
@@ -80,13 +83,20 @@ pub(crate) async fn run(
     for note in &answer.notes {
         progress::say(&format!("note: {note}"));
     }
+    if is_point(&answer) && answer.rows.iter().all(|row| row.coverage_percent <= 0.0) {
+        progress::say(NOTHING_THERE);
+    }
     progress::say(&answer.cited.source);
     Ok(())
 }
 
+fn is_point(answer: &StatisticsAnswer) -> bool {
+    answer.size_unit == "1"
+}
+
 /// What statistics are of, with its size; a point has none.
 fn taken(answer: &StatisticsAnswer) -> String {
-    if answer.size_unit == "1" {
+    if is_point(answer) {
         return format!("{} {}", answer.kind, answer.geometry);
     }
     format!(

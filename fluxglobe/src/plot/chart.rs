@@ -11,6 +11,8 @@ use plotters::prelude::{
     SVGBackend, SeriesLabelPosition, WHITE,
 };
 
+use crate::figures::middle;
+
 use super::marked::{Marked, Marks};
 use super::page::{Area, COLOURS, Failed, with_unit};
 use super::time_axis::TimeAxis;
@@ -52,7 +54,7 @@ pub(super) fn place(answer: &SeriesAnalysis) -> String {
         (Some(region), _, _) => format!("mean over {}", named(region)),
         (None, Some(line), _) => format!("mean along {}", named(line)),
         (None, None, Some(cell)) => {
-            format!("cell around {:.4}, {:.4}", cell.lon_deg, cell.lat_deg)
+            format!("cell around {}", middle(cell))
         }
         (None, None, None) => String::new(),
     }
