@@ -4,6 +4,7 @@ mod analysis;
 mod annotations;
 mod attach;
 mod budget;
+mod degrees;
 mod derive;
 mod derived;
 mod export;
@@ -409,10 +410,10 @@ pub(crate) struct RenderGlobe {
 #[derive(Debug, Args)]
 pub(crate) struct Camera {
     /// Longitude below the camera, or above one in the sea, degrees east.
-    #[arg(long, allow_negative_numbers = true)]
+    #[arg(long, allow_negative_numbers = true, value_parser = degrees::degrees)]
     pub(crate) lon: Option<f64>,
     /// Latitude below the camera, or above one in the sea, degrees north.
-    #[arg(long, allow_negative_numbers = true)]
+    #[arg(long, allow_negative_numbers = true, value_parser = degrees::degrees)]
     pub(crate) lat: Option<f64>,
     /// Height of the camera above the ground, km, 1 to 1e6; -1 to -1000 below the sea surface, among what sank as deep as
     /// it is drawn.

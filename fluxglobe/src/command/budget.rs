@@ -89,7 +89,8 @@ async fn query(settings: &Settings, store: &Store, options: &Budget) -> Result<B
         Some(text) if file::is_file_name(text) => Some(file::text(Path::new(text))?),
         text => text.clone(),
     };
-    let besides = options.words(regions.as_deref()).asked()?;
+    let besides = options.words(regions.as_deref()).asked();
+    let besides = besides.map_err(|error| of_file(options.regions.as_deref(), error))?;
     let mut versions = BTreeMap::new();
     for product in besides.products() {
         let manifest = deployment::manifest(store, &product, &settings.data).await?;
@@ -105,6 +106,15 @@ async fn query(settings: &Settings, store: &Store, options: &Budget) -> Result<B
         ocean: ocean(settings, store, options.ocean.as_ref()).await?,
     };
     Ok(besides.of(wishes.query(options.product.product.clone()), &versions)?)
+}
+
+/// What is wrong with regions of a file is said of the file, and not of its text.
+fn of_file(regions: Option<&str>, error: ContractError) -> ContractError {
+    let ContractError::Invalid { what, reason, .. } = &error;
+    match regions.filter(|name| *what == "regions" && file::is_file_name(name)) {
+        Some(name) => ContractError::invalid(*what, name, reason),
+        None => error,
+    }
 }
 
 /// Millions of square kilometres with three decimals; what rounding leaves of nothing is nothing, and not below it.
@@ -250,6 +260,20 @@ pub(crate) fn region(text: &str) -> Result<AskedRegion> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn regions_that_are_wrong_are_called_by_their_file() {
+        let wrong = || contract::region::named_regions("{\"type\":\"Point\"}").unwrap_err();
+        let told = of_file(Some("parts.geojson"), wrong()).to_string();
+        assert!(
+            told.starts_with("regions \"parts.geojson\" is not valid"),
+            "{told}"
+        );
+        let asked = "{\"type\":\"Point\"}";
+        assert_eq!(of_file(Some(asked), wrong()), wrong());
+        let other = || ContractError::invalid("river flux", "650", "say where it is from");
+        assert_eq!(of_file(Some("parts.geojson"), other()), other());
+    }
 
     #[test]
     fn nothing_has_no_sign() {
