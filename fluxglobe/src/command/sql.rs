@@ -200,6 +200,10 @@ async fn written(
             reached.set(Reached::Finishing);
         }
         tokio::task::spawn_blocking(move || file.finish()).await??;
+        if output.is_none() && matches!(form, AnswerFormat::Json) {
+            // What is said next stands on a line of its own.
+            progress::result("")?;
+        }
         Ok::<_, anyhow::Error>(count)
     };
     match writing.await {
