@@ -99,11 +99,8 @@ fn made_of(read: ReadSeries, options: &AnalysisOptions) -> SeriesAnalysis {
 
 /// Says that a series has no steps in some of the first or last years of a base period that was asked for.
 fn short_of(base: BasePeriod, extent: Period) -> Option<String> {
-    let (asked, held) = (base.years(), BasePeriod::around(extent).years());
-    let first = *asked.start().max(held.start());
-    let last = *asked.end().min(held.end());
     // Of no year in common the refusal tells.
-    let common = BasePeriod::new(first, last).ok()?;
+    let common = base.touched_by(extent)?;
     (common != base).then(|| {
         format!("of the base period {base} there are steps in {common} alone: the climatology is that of these years")
     })

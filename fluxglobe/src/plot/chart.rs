@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use contract::analysis::{Hovmoller, SeriesAnalysis};
+use contract::analysis::{BasePeriod, Hovmoller, SeriesAnalysis};
 use contract::cited::Cited;
 use contract::time::{Period, TimeMs};
 use plotters::chart::ChartContext;
@@ -57,6 +57,14 @@ pub(super) fn place(answer: &SeriesAnalysis) -> String {
             format!("cell around {}", middle(cell))
         }
         (None, None, None) => String::new(),
+    }
+}
+
+/// The years of a climatology, and of which of them the series has steps where these are not all.
+pub(super) fn years_of(answer: &SeriesAnalysis, base: BasePeriod) -> String {
+    match base.touched_by(period(answer.start, answer.end)) {
+        Some(held) if held != base => format!("{base} (steps in {held} alone)"),
+        _ => base.to_string(),
     }
 }
 

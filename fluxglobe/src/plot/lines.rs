@@ -8,7 +8,7 @@ use plotters::prelude::{BLACK, Color as _, LineSeries, Rectangle};
 
 use crate::figures::middle;
 
-use super::chart::{Point, axis_of, chart, label, lines, named, period, place};
+use super::chart::{Point, axis_of, chart, label, lines, named, period, place, years_of};
 use super::page::{self, COLOURS, Words, range, with_unit};
 
 pub(super) fn of_point(answer: &PointSeries) -> Result<String> {
@@ -49,7 +49,8 @@ fn series(cited: &Cited, place: &str, points: &[Point]) -> Result<String> {
 pub(super) fn of_anomalies(answer: &SeriesAnalysis, made: &Anomalies) -> Result<String> {
     let below = format!(
         "anomaly from the {} climatology of {}; above it orange, below it blue",
-        made.bins, made.base
+        made.bins,
+        years_of(answer, made.base)
     );
     let words = Words::of(&answer.cited, &place(answer), below);
     let points: Vec<Point> = made

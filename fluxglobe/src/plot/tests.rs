@@ -57,6 +57,10 @@ fn a_climatology_is_a_line_of_means_in_a_band_of_spreads() {
     let svg = of_analysis(&analysis("climatology", made)).unwrap();
     is_told(&svg);
     assert!(svg.contains("2001/2010") && svg.contains("Jan") && svg.contains("Dec"));
+    assert!(!svg.contains("alone"), "all of its years have steps");
+    let made = json!({"bins": "month", "base": "1991/2020", "rows": rows});
+    let short = of_analysis(&analysis("climatology", made)).unwrap();
+    assert!(short.contains("1991/2020 (steps in 2001/2010 alone)"));
     // One month has no data and one no spread: three bands, and eleven dots.
     assert_eq!(
         (
