@@ -110,10 +110,17 @@ async fn query(settings: &Settings, store: &Store, options: &Budget) -> Result<B
 
 /// What is wrong with regions of a file is said of the file, and not of its text.
 fn of_file(regions: Option<&str>, error: ContractError) -> ContractError {
-    let ContractError::Invalid { what, reason, .. } = &error;
-    match regions.filter(|name| *what == "regions" && file::is_file_name(name)) {
-        Some(name) => ContractError::invalid(*what, name, reason),
-        None => error,
+    let name = regions.filter(|name| file::is_file_name(name));
+    match (name, error) {
+        (
+            Some(name),
+            ContractError::Invalid {
+                what: what @ "regions",
+                reason,
+                ..
+            },
+        ) => ContractError::invalid(what, name, reason),
+        (_, error) => error,
     }
 }
 
