@@ -538,6 +538,35 @@ mod tests {
     }
 
     #[test]
+    fn a_value_that_cannot_be_says_what_can() {
+        for (words, said) in [
+            (&["gc", "--keep-versions", "0"][..], "1 to 65535"),
+            (
+                &[
+                    "stats",
+                    "point",
+                    "--product",
+                    "a",
+                    "--lon",
+                    "10W",
+                    "--lat",
+                    "0",
+                ],
+                "east and north positive",
+            ),
+            (
+                &[
+                    "render", "globe", "--layer", "a", "--lon", "0", "--lat", "5N", "-o", "a.png",
+                ],
+                "east and north positive",
+            ),
+        ] {
+            let refused = Cli::try_parse_from([&["fluxglobe"], words].concat()).unwrap_err();
+            assert!(refused.to_string().contains(said), "{refused}");
+        }
+    }
+
+    #[test]
     fn what_every_command_takes_stands_apart_from_its_own() {
         let mut program = Cli::command();
         program.build();
