@@ -539,29 +539,19 @@ mod tests {
 
     #[test]
     fn a_value_that_cannot_be_says_what_can() {
+        let degrees = "east and north positive";
         for (words, said) in [
-            (&["gc", "--keep-versions", "0"][..], "1 to 65535"),
+            ("fluxglobe gc --keep-versions 0", "1 to 65535"),
             (
-                &[
-                    "stats",
-                    "point",
-                    "--product",
-                    "a",
-                    "--lon",
-                    "10W",
-                    "--lat",
-                    "0",
-                ],
-                "east and north positive",
+                "fluxglobe stats point --product a --lon 10W --lat 0",
+                degrees,
             ),
             (
-                &[
-                    "render", "globe", "--layer", "a", "--lon", "0", "--lat", "5N", "-o", "a.png",
-                ],
-                "east and north positive",
+                "fluxglobe render globe --layer a --lon 0 --lat 5N -o a.png",
+                degrees,
             ),
         ] {
-            let refused = Cli::try_parse_from([&["fluxglobe"], words].concat()).unwrap_err();
+            let refused = Cli::try_parse_from(words.split(' ')).unwrap_err();
             assert!(refused.to_string().contains(said), "{refused}");
         }
     }
