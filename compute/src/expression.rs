@@ -267,7 +267,13 @@ fn is_last_argument(name: &str, text: &str) -> bool {
 
 /// What the engine says, in one line.
 fn in_words(error: &DataFusionError) -> String {
-    let text = error.strip_backtrace();
+    let text = match error.find_root() {
+        DataFusionError::SQL(error, _trace) => {
+            let reason = error.to_string().replace("sql parser error: ", "");
+            format!("the expression cannot be read: {reason}")
+        }
+        _ => error.strip_backtrace(),
+    };
     text.lines().next().unwrap_or_default().to_owned()
 }
 

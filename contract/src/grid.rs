@@ -29,7 +29,7 @@ impl LonLatDeg {
             return Err(ContractError::invalid(
                 "place",
                 &text,
-                "longitude, latitude in degrees, latitude -90 to 90",
+                "degrees, the longitude first and then the latitude, which is -90 to 90",
             ));
         }
         Ok(Self {
@@ -225,6 +225,12 @@ mod tests {
                 .sum();
             assert!((sum / earth.cell_area_m2(-90.0, 90.0, 360.0) - 1.0).abs() < 1e-12);
         }
+    }
+
+    #[test]
+    fn of_a_place_the_wrong_way_round_it_is_said_which_comes_first() {
+        let refused = LonLatDeg::new(0.0, -150.0).unwrap_err().to_string();
+        assert!(refused.contains("longitude first"), "{refused}");
     }
 
     #[test]

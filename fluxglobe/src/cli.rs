@@ -4,6 +4,7 @@ mod analysis;
 mod annotations;
 mod attach;
 mod budget;
+mod degrees;
 mod derive;
 mod derived;
 mod export;
@@ -303,7 +304,8 @@ pub(crate) struct Ingest {
     /// Product to land in, if not the profile's.
     #[arg(long, value_name = "PRODUCT")]
     pub(crate) product: Option<ProductId>,
-    /// Variable to land, where no profile is for the file and it holds several: any on a grid.
+    /// Variable to land, where no profile is for the file and it holds several: any on a grid. Of a file that a profile is for, the
+    /// one that it reads; for another give the profile that does.
     #[arg(long, value_name = "NAME", conflicts_with = "profile")]
     pub(crate) variable: Option<String>,
     /// One JSON object a file.
@@ -408,10 +410,10 @@ pub(crate) struct RenderGlobe {
 #[derive(Debug, Args)]
 pub(crate) struct Camera {
     /// Longitude below the camera, or above one in the sea, degrees east.
-    #[arg(long, allow_negative_numbers = true)]
+    #[arg(long, allow_negative_numbers = true, value_parser = degrees::degrees)]
     pub(crate) lon: Option<f64>,
     /// Latitude below the camera, or above one in the sea, degrees north.
-    #[arg(long, allow_negative_numbers = true)]
+    #[arg(long, allow_negative_numbers = true, value_parser = degrees::degrees)]
     pub(crate) lat: Option<f64>,
     /// Height of the camera above the ground, km, 1 to 1e6; -1 to -1000 below the sea surface, among what sank as deep as
     /// it is drawn.
@@ -533,6 +535,25 @@ mod tests {
     #[test]
     fn the_command_line_is_consistent() {
         Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn a_value_that_cannot_be_says_what_can() {
+        let degrees = "east and north positive";
+        for (words, said) in [
+            ("fluxglobe gc --keep-versions 0", "1 to 65535"),
+            (
+                "fluxglobe stats point --product a --lon 10W --lat 0",
+                degrees,
+            ),
+            (
+                "fluxglobe render globe --layer a --lon 0 --lat 5N -o a.png",
+                degrees,
+            ),
+        ] {
+            let refused = Cli::try_parse_from(words.split(' ')).unwrap_err();
+            assert!(refused.to_string().contains(said), "{refused}");
+        }
     }
 
     #[test]

@@ -190,9 +190,19 @@ pub(crate) async fn manifest(store: &Store, product: &ProductId, data: &Path) ->
         );
     }
     bail!(
-        "there is no product {product}; there are {}",
-        known.join(", ")
+        "there is no product {product}; there are {}{}",
+        known.join(", "),
+        made_by(product, &known)
     )
+}
+
+/// What makes the product that is not there, where one that is there has it made.
+fn made_by(product: &ProductId, known: &[String]) -> String {
+    let flux = product.as_str().strip_suffix("-accumulated");
+    match flux.filter(|flux| known.iter().any(|one| one == flux)) {
+        Some(flux) => format!("; `fluxglobe derive accumulated --product {flux}` makes it"),
+        None => String::new(),
+    }
 }
 
 /// The version of a product that is asked for, or an error that says what there is.
@@ -213,4 +223,18 @@ pub(crate) async fn version(store: &Store, asked: &AskedVersion, data: &Path) ->
         bail!("version {number} of {product} is {id}, not {asked}");
     }
     Ok(manifest)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_would_make_a_product_that_is_not_there_is_named() {
+        let known = ["flux".to_owned()];
+        let of = |name: &str| made_by(&name.parse().unwrap(), &known);
+        assert!(of("flux-accumulated").contains("derive accumulated --product flux`"));
+        assert_eq!(of("flx-accumulated"), "");
+        assert_eq!(of("flx"), "");
+    }
 }

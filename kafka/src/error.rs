@@ -99,8 +99,14 @@ impl KafkaFailure {
         if self.is_retryable() {
             StorageError::log(servers, self)
         } else {
+            // Where no server is named, that is what is wrong.
+            let log = if servers.is_empty() {
+                "on Kafka"
+            } else {
+                servers
+            };
             StorageError::LogSetup {
-                log: servers.to_owned(),
+                log: log.to_owned(),
                 reason: self.to_string(),
             }
         }
@@ -155,5 +161,10 @@ mod tests {
         let refused = client(RDKafkaErrorCode::TopicAuthorizationFailed).of_log("a:1");
         assert!(matches!(refused, StorageError::LogSetup { .. }));
         assert!(refused.to_string().contains("broker a:1 is down"));
+        let unnamed = KafkaFailure::Settings("--kafka is needed").of_log("");
+        assert_eq!(
+            unnamed.to_string(),
+            "event log on Kafka cannot be used: --kafka is needed"
+        );
     }
 }

@@ -26,7 +26,10 @@ fn what_a_landing_leaves_behind_is_named_and_so_is_what_recompute_leaves() {
     let [first, revised] =
         [("first.h5", "1"), ("revised.h5", "2")].map(|(name, seed)| generated(name, seed));
     let said = "made of an older version";
-    assert!(!talk(&["ingest", &first]).contains(said));
+    let not_added_up = format!("`fluxglobe derive accumulated --product {PRODUCT}`");
+    let landed = talk(&["ingest", &first]);
+    assert!(!landed.contains(said), "{landed}");
+    assert!(landed.contains(&not_added_up), "{landed}");
     talk(&["derive", "accumulated", "--product", PRODUCT]);
     talk(&[
         "derive",
@@ -42,7 +45,7 @@ fn what_a_landing_leaves_behind_is_named_and_so_is_what_recompute_leaves() {
     let both = format!("{said}: {PRODUCT}-accumulated, {PRODUCT}-mean;");
     let recompute = format!("`fluxglobe recompute --product {PRODUCT}`");
     assert!(
-        landed.contains(&both) && landed.contains(&recompute),
+        landed.contains(&both) && landed.contains(&recompute) && !landed.contains(&not_added_up),
         "{landed}"
     );
 

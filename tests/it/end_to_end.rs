@@ -64,6 +64,39 @@ fn the_global_budget_is_the_published_one_on_both_earths() {
 }
 
 #[test]
+fn a_place_without_data_and_a_folder_without_objects_are_told_to_be_so() {
+    let said = |data: &Path, words: &[&str]| {
+        let output = program::run(data, words).unwrap();
+        assert!(output.status.success(), "{output:?}");
+        String::from_utf8(output.stderr).unwrap()
+    };
+    let at = |lon: &str, lat: &str, more: &[&str]| {
+        let point = [
+            "stats",
+            "point",
+            "--product",
+            "takahashi09-flux",
+            "--lon",
+            lon,
+            "--lat",
+            lat,
+        ];
+        said(demo_data(), &[&point, more].concat())
+    };
+    // Poland, the series and statistics of it; and the Pacific.
+    for more in [&[][..], &["--step", "year"]] {
+        let land = at("20", "50", more);
+        assert!(land.contains("no step holds data at this place"), "{land}");
+        let sea = at("-150", "0", more);
+        assert!(!sea.contains("no step holds data"), "{sea}");
+    }
+    assert!(at("-150", "0", &[]).contains("149.5° W, 0.5° S"));
+    let empty = tempfile::tempdir().unwrap();
+    let verified = said(empty.path(), &["verify"]);
+    assert!(verified.contains("nothing is stored there"), "{verified}");
+}
+
+#[test]
 fn the_error_of_filled_gaps_is_told_by_hiding_data() {
     let data = demo_data();
     let words = [

@@ -154,8 +154,8 @@ fn a_question_comes_from_a_file_or_standard_input_and_a_table_has_an_end() {
         .unwrap();
     let output = child.wait_with_output().unwrap();
     assert_eq!(
-        String::from_utf8(output.stdout).unwrap().trim(),
-        "[{\"n\":777600}]"
+        String::from_utf8(output.stdout).unwrap(),
+        "[{\"n\":777600}]\n"
     );
 
     let all = [

@@ -1,7 +1,10 @@
 //! What is made of one series: a version of a product, a place or region and a period in; climatology, anomaly, trend, season
 //! and extremes out, each or the reason why there is none.
 
-use contract::analysis::{AnalysisOptions, AnalysisPart, Refused, SeriesAnalysis, SeriesQuery};
+use contract::analysis::{
+    AnalysisOptions, AnalysisPart, BasePeriod, Refused, SeriesAnalysis, SeriesQuery,
+};
+use contract::time::Period;
 use futures::future::BoxFuture;
 
 use super::climatology::{anomalies, climatology};
@@ -62,6 +65,12 @@ fn made_of(read: ReadSeries, options: &AnalysisOptions) -> SeriesAnalysis {
         cited,
         place,
     };
+    let has_base =
+        |part: &AnalysisPart| matches!(part, AnalysisPart::Climatology | AnalysisPart::Anomaly);
+    if options.parts.iter().any(has_base) {
+        let short = options.base.and_then(|base| short_of(base, extent));
+        answer.notes.extend(short);
+    }
     for part in &options.parts {
         let made = match part {
             AnalysisPart::Climatology => climatology(&periods, &values, options.bins, options.base)
@@ -86,6 +95,15 @@ fn made_of(read: ReadSeries, options: &AnalysisOptions) -> SeriesAnalysis {
             .extend(made.err().map(|e| refused(*part, &e)));
     }
     answer
+}
+
+/// Says that a series has no steps in some of the first or last years of a base period that was asked for.
+fn short_of(base: BasePeriod, extent: Period) -> Option<String> {
+    // Of no year in common the refusal tells.
+    let common = base.touched_by(extent)?;
+    (common != base).then(|| {
+        format!("of the base period {base} there are steps in {common} alone: the climatology is that of these years")
+    })
 }
 
 fn refused(part: AnalysisPart, why: &Undefined) -> Refused {

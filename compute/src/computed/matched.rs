@@ -73,7 +73,12 @@ pub(super) fn pressures_of_a_kind(inputs: &[Input], how: &Computation) -> Result
     };
     for (quantity, wrong) in [(Quantity::Pco2, "fco2"), (Quantity::Fco2, "pco2")] {
         if let Some(name) = of(quantity).filter(|name| name.starts_with(wrong)) {
-            return Err(refused(format!("{name} holds {}", quantity.title())));
+            let right = name.replacen(wrong, quantity.word(), 1);
+            return Err(refused(format!(
+                "{name} holds {}: give it as {right} (derive co2-flux: --{}), and water and air as pressures or as fugacities both",
+                quantity.title(),
+                right.replace('_', "-")
+            )));
         }
     }
     let is_converted = ["fco2_of_pco2", "pco2_of_fco2"]

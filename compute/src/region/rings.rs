@@ -97,7 +97,7 @@ fn open(corners: &[[f64; 2]]) -> Result<Vec<[f64; 2]>, ComputeError> {
     };
     if let Some(corner) = corners.iter().find(|corner| !place(corner)) {
         return Err(bad(format!(
-            "{corner:?} is no longitude, latitude in degrees"
+            "{corner:?} is no longitude, latitude in degrees: the longitude comes first, and the latitude is -90 to 90"
         )));
     }
     let repeated = corners.len() > 1 && corners.first() == corners.last();

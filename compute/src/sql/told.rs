@@ -9,6 +9,9 @@ use crate::ComputeError;
 /// Longest part of an engine's message that is told.
 const MAX_MESSAGE: usize = 2000;
 
+/// What the engine says of a text that it takes for an instant and that is none, in whatever rule it meets it.
+const NO_INSTANT: &str = "Error parsing timestamp";
+
 /// What a question is told whose time is over.
 pub(super) fn overdue(limits: SqlLimits) -> ComputeError {
     ComputeError::QueryTime {
@@ -71,6 +74,10 @@ fn own(error: DataFusionError) -> Result<ComputeError, DataFusionError> {
 fn in_words(error: &DataFusionError) -> String {
     let text = match error.find_root() {
         DataFusionError::SQL(error, _trace) => error.to_string().replace("sql parser error: ", ""),
+        DataFusionError::ArrowError(inner, _trace) if inner.to_string().contains(NO_INSTANT) => {
+            let reason = inner.to_string().replace("Parser error: ", "");
+            format!("{reason}; write '2000-07-01' or '2000-07-01T12:00:00Z'")
+        }
         _ => error.strip_backtrace(),
     };
     match text.char_indices().nth(MAX_MESSAGE) {

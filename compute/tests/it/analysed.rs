@@ -100,6 +100,35 @@ async fn a_region_and_a_cell_of_one_value_have_one_analysis_and_it_is_that_of_th
     assert_eq!(point.place.cell.unwrap().row, 5);
 }
 
+#[tokio::test(flavor = "multi_thread")]
+async fn a_base_period_that_reaches_beyond_the_series_is_told() {
+    let (_folder, store) = folder_store();
+    let manifest = wind(&store, "wind", &months(36, |month, _| rising(month))).await;
+    let id = manifest.id();
+    let engine = Engine::in_process(store.clone(), parts(1));
+    let notes = async |part: AnalysisPart, base: &str| {
+        let options = AnalysisOptions {
+            base: Some(base.parse().unwrap()),
+            ..AnalysisOptions::new(vec![part]).unwrap()
+        };
+        let query = cell("wind", -130.5, -15.5);
+        let found = analyse(&engine, (&manifest, &id), &query, &options).await;
+        found.unwrap().notes
+    };
+    for part in [AnalysisPart::Climatology, AnalysisPart::Anomaly] {
+        assert_eq!(notes(part, "2001/2003").await, Vec::<String>::new());
+        assert_eq!(notes(part, "2002/2003").await, Vec::<String>::new());
+        let told = notes(part, "1991/2020").await;
+        assert!(
+            told.len() == 1 && told[0].contains("1991/2020") && told[0].contains("2001/2003"),
+            "{told:?}"
+        );
+    }
+    // What has no base period says nothing of one.
+    let season = notes(AnalysisPart::Season, "1991/2020").await;
+    assert_eq!(season, Vec::<String>::new());
+}
+
 fn line(name: &str, line: &str) -> SeriesQuery {
     let query = LineSeriesQuery::new(product(name), line.parse().unwrap());
     SeriesQuery::Line(query)

@@ -374,6 +374,10 @@ const REFUSED: &[(&str, &str)] = &[
         "not found; products are sst-test",
     ),
     ("SELECT depth FROM sst_test", "depth"),
+    (
+        "SELECT value FROM sst_test WHERE time_start = '2000-07'",
+        "write '2000-07-01'",
+    ),
     ("SHOW FULL COLUMNS FROM sst_test", "ask DESCRIBE"),
     ("SHOW COLUMNS FROM sst_test LIKE 'v%'", "ask DESCRIBE"),
     ("SHOW COLUMNS FROM atlantis", "not found"),

@@ -45,6 +45,12 @@ impl BasePeriod {
         Self([first, last.max(first)])
     }
 
+    /// Those of its years, from the first to the last, that a period touches; none if it touches none.
+    pub fn touched_by(self, period: Period) -> Option<Self> {
+        let [first, last] = Self::around(period).0;
+        Self::new(self.0[0].max(first), self.0[1].min(last)).ok()
+    }
+
     /// From the first instant of the first year to the end of the last.
     pub fn period(self) -> Period {
         let [first, last] = self.0.map(Period::year);
@@ -125,6 +131,9 @@ mod tests {
         assert_eq!(BasePeriod::around(period), base);
         let month = Period::month(2000, 12).unwrap();
         assert_eq!(BasePeriod::around(month).to_string(), "2000/2000");
+        assert_eq!(base.touched_by(month), Some(BasePeriod::around(month)));
+        assert_eq!(base.touched_by(period), Some(base));
+        assert_eq!(base.touched_by(Period::month(1990, 12).unwrap()), None);
         for wrong in [
             "",
             "1991",

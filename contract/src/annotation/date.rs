@@ -3,6 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use super::Label;
+use crate::analysis::MapStatistic;
+use crate::computed::{Computation, Computed};
 use crate::manifest::Manifest;
 use crate::quantity::Quantity;
 use crate::time::TimeMs;
@@ -13,7 +15,7 @@ use crate::time::TimeMs;
 pub struct DateLabel {
     /// The instant, or the one step that a product has.
     pub shown: Label,
-    /// What the values are means over, or from when on they were added up.
+    /// What the values are means over, which other statistic of that time they are, or from when on they were added up.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub note: Option<Label>,
 }
@@ -24,12 +26,19 @@ impl DateLabel {
     pub fn of(product: &Manifest, time: TimeMs) -> Option<Self> {
         let bracket = product.bracket(time)?;
         let period = product.steps.get(bracket.after)?.period;
-        let accumulated = product.quantity == Quantity::AccumulatedCarbon;
+        let statistic = product.computed.as_ref().and_then(over_time);
+        let is_sum = product.quantity == Quantity::AccumulatedCarbon;
+        let accumulated = is_sum && statistic.is_none();
         let adjective = period.adjective();
         let (shown, note) = match product.steps.as_slice() {
             // There is one picture, whatever the instant.
             [_only] if !accumulated => {
-                let note = adjective.map(|length| format!("{length} mean"));
+                let note = match statistic {
+                    None | Some(MapStatistic::Mean) => {
+                        adjective.map(|length| format!("{length} mean"))
+                    }
+                    Some(other) => of_all_time(other),
+                };
                 (period.in_words(), note)
             }
             steps => {
@@ -38,11 +47,18 @@ impl DateLabel {
                 } else {
                     time.in_words()
                 };
-                let note = if accumulated {
-                    let first = steps.first()?.period.start.day_in_words();
-                    Some(format!("added up since {first}"))
-                } else {
-                    adjective.map(|length| format!("{length} means"))
+                let note = match (accumulated, statistic) {
+                    (true, _) => {
+                        let first = steps.first()?.period.start.day_in_words();
+                        Some(format!("added up since {first}"))
+                    }
+                    (false, Some(MapStatistic::Climatology)) => {
+                        let asked = product.computed.as_ref().and_then(|c| c.map.as_ref());
+                        let base = asked.and_then(|asked| asked.base);
+                        let of = |base| format!("climatology of {base}");
+                        Some(base.map_or_else(|| "climatology".to_owned(), of))
+                    }
+                    (false, _) => adjective.map(|length| format!("{length} means")),
                 };
                 (day, note)
             }
@@ -51,5 +67,39 @@ impl DateLabel {
             shown: Label::cut(&shown)?,
             note: note.and_then(|note| Label::cut(&note)),
         })
+    }
+}
+
+/// The statistic over time that the values are, of one product or of two.
+fn over_time(computed: &Computed) -> Option<MapStatistic> {
+    match computed.how {
+        Computation::Statistic { statistic, .. } => Some(statistic),
+        Computation::Correlation { statistic, .. } => Some(MapStatistic::Correlation(statistic)),
+        Computation::Expression { .. } | Computation::Regrid { .. } => None,
+    }
+}
+
+/// What values are of all the time that is shown, where they keep the quantity and so nothing else of the picture says it. The
+/// quantities of the others are called by what they are.
+fn of_all_time(statistic: MapStatistic) -> Option<String> {
+    match statistic {
+        MapStatistic::Min => Some("lowest of this time".to_owned()),
+        MapStatistic::Max => Some("highest of this time".to_owned()),
+        MapStatistic::Percentile(_) => Some(format!("{statistic} of this time")),
+        MapStatistic::Mean
+        | MapStatistic::MinTime
+        | MapStatistic::MaxTime
+        | MapStatistic::Count
+        | MapStatistic::Coverage
+        | MapStatistic::Spread
+        | MapStatistic::Climatology
+        | MapStatistic::Anomaly
+        | MapStatistic::Amplitude
+        | MapStatistic::Phase
+        | MapStatistic::Trend
+        | MapStatistic::TrendPValue
+        | MapStatistic::LeastSquaresTrend
+        | MapStatistic::LeastSquaresTrendPValue
+        | MapStatistic::Correlation(_) => None,
     }
 }

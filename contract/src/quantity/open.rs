@@ -57,6 +57,15 @@ struct Known {
     shown_unit: String,
 }
 
+/// Statistics of a mass that are one, as their names end.
+const MASS_STATISTICS: [&str; 5] = [
+    "anomaly",
+    "standard_deviation",
+    "annual_amplitude",
+    "trend",
+    "least_squares_trend",
+];
+
 /// All that are known.
 struct All {
     /// By their JSON.
@@ -100,7 +109,7 @@ impl OpenQuantity {
             return Err(ContractError::invalid("quantity", &words.name, reason));
         }
         let known = Known {
-            shown_unit: shown_unit(&words.unit),
+            shown_unit: shown_unit_of(&words),
             words,
         };
         let known: &'static Known = Box::leak(Box::new(known));
@@ -240,6 +249,20 @@ fn rounded_up(value: f64) -> f64 {
     }
     let step = 10f64.powi(value.abs().log10().floor() as i32 - 1);
     format!("{:.1e}", near + step).parse().unwrap_or(value)
+}
+
+/// The unit as people read it. UDUNITS has no word for of what a gram is: of statistics of carbon it is carbon, as that of what they
+/// are of, and not CO₂.
+fn shown_unit_of(words: &OpenWords) -> String {
+    let shown = shown_unit(&words.unit);
+    let of_carbon = ["carbon_flux_", "accumulated_carbon_"]
+        .iter()
+        .filter_map(|quantity| words.name.strip_prefix(quantity))
+        .any(|statistic| MASS_STATISTICS.contains(&statistic));
+    match shown.strip_prefix("g ") {
+        Some(rest) if of_carbon => format!("g C {rest}"),
+        _ => shown,
+    }
 }
 
 /// `kg m-2 s-1` as `kg m⁻² s⁻¹`: digits that end a word, and their sign, are raised.
@@ -394,6 +417,25 @@ mod tests {
             words("a", "m", Some([f64::NAN, 1.0])),
         ] {
             assert!(OpenQuantity::new(bad.clone()).is_err(), "{bad:?}");
+        }
+    }
+
+    #[test]
+    fn a_gram_of_statistics_of_carbon_is_one_of_carbon() {
+        let shown = |name: &str, unit: &str| shown_unit_of(&words(name, unit, None));
+        for (name, unit, expected) in [
+            ("carbon_flux_anomaly", "g m-2 year-1", "g C m⁻² year⁻¹"),
+            (
+                "carbon_flux_trend",
+                "g m-2 year-1 year-1",
+                "g C m⁻² year⁻¹ year⁻¹",
+            ),
+            ("accumulated_carbon_anomaly", "g m-2", "g C m⁻²"),
+            ("carbon_flux_trend_p_value", "1", ""),
+            ("carbon_flux_of_somebody", "g m-2 year-1", "g m⁻² year⁻¹"),
+            ("co2_flux", "g m-2 year-1", "g m⁻² year⁻¹"),
+        ] {
+            assert_eq!(shown(name, unit), expected, "{name}");
         }
     }
 

@@ -27,7 +27,7 @@ pub fn named_regions(text: &str) -> Result<Vec<AskedRegion>, ContractError> {
 
 fn read(text: &str) -> Result<Vec<AskedRegion>, String> {
     let GeoJson::FeatureCollection(collection) = document(text)? else {
-        return Err("a FeatureCollection is wanted, a region a feature".to_owned());
+        return Err("a FeatureCollection is wanted, a region a feature; one region alone is given as `region`".to_owned());
     };
     let count = collection.features.len();
     if !(1..=MAX_REGIONS).contains(&count) {

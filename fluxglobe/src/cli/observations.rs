@@ -15,8 +15,8 @@ pub(crate) enum Observations {
     List(ObservationsAsked),
     /// The observations themselves, in the order of time.
     Query(ObservationsAsked),
-    /// Hold observations against a product: nearest cell, bias, RMSE, scatter plot. Those that failed a test or are deeper than 10 m
-    /// are left out unless told otherwise.
+    /// Hold observations against a product: nearest cell, bias, RMSE, scatter plot. Those of the time that the product covers are
+    /// taken; those that failed a test or are deeper than 10 m are left out unless told otherwise.
     Matchup(Matchup),
 }
 

@@ -10,6 +10,7 @@ use contract::statistics::{MinCoverage, Statistics, StatisticsWishes};
 use contract::time::{TimeMs, TimeStep};
 
 use super::analysis::{Analysis, StatsCorrelate, StatsDifference, StatsHovmoller};
+use super::degrees::degrees;
 use super::steps::STEPS;
 
 /// `fluxglobe stats`.
@@ -69,10 +70,10 @@ pub(crate) struct StatsPoint {
     #[arg(long, value_name = "PRODUCT[@VERSION]")]
     pub(crate) product: AskedVersion,
     /// Longitude, degrees east.
-    #[arg(long, allow_negative_numbers = true)]
+    #[arg(long, allow_negative_numbers = true, value_parser = degrees)]
     pub(crate) lon: f64,
     /// Latitude, degrees north.
-    #[arg(long, allow_negative_numbers = true)]
+    #[arg(long, allow_negative_numbers = true, value_parser = degrees)]
     pub(crate) lat: f64,
     /// First instant of statistics: 2000, 2000-03, 2000-03-15 or with a time of day. The product's first if absent.
     #[arg(long)]

@@ -143,7 +143,7 @@ pub(crate) struct Migrate {
 #[derive(Debug, Args)]
 pub(crate) struct Gc {
     /// Newest versions of each product that stay readable.
-    #[arg(long, default_value = "10")]
+    #[arg(long, default_value = "10", value_parser = kept_versions)]
     pub(crate) keep_versions: NonZeroU16,
     /// Whatever was written in the last days stays, and of the last hour in any case.
     #[arg(long, default_value = "30", value_name = "DAYS")]
@@ -151,6 +151,12 @@ pub(crate) struct Gc {
     /// List and remove nothing.
     #[arg(long)]
     pub(crate) dry_run: bool,
+}
+
+/// How many versions stay.
+fn kept_versions(text: &str) -> Result<NonZeroU16, String> {
+    text.parse()
+        .map_err(|_none| "give 1 to 65535: the newest version always stays".to_owned())
 }
 
 /// `fluxglobe survey`.

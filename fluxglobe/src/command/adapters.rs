@@ -46,7 +46,7 @@ pub(crate) fn run(settings: &Settings, options: &Adapters) -> Result<()> {
     if options.json {
         progress::result(&serde_json::to_string_pretty(&rows)?)?;
     } else if !rows.is_empty() {
-        progress::result(&table(&rows).to_string())?;
+        progress::result(&table(&rows).trim_fmt())?;
     }
     used?;
     Ok(())

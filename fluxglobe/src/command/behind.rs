@@ -4,7 +4,8 @@ use std::collections::BTreeSet;
 
 use anyhow::Result;
 use contract::product::ProductId;
-use storage::Store;
+use contract::quantity::Quantity;
+use storage::{Store, manifests};
 
 use crate::progress;
 
@@ -25,6 +26,34 @@ pub(super) async fn say_what_is_behind<'a>(
         progress::say(&line);
     }
     Ok(())
+}
+
+/// Says of fluxes that their carbon is not added up: a deriver does it, and a command when it is told to.
+pub(super) async fn say_what_is_not_added_up<'a>(
+    store: &Store,
+    products: impl IntoIterator<Item = &'a ProductId>,
+) -> Result<()> {
+    let products: BTreeSet<&ProductId> = products.into_iter().collect();
+    for product in products {
+        let Some(manifest) = manifests::latest(store, product).await? else {
+            continue;
+        };
+        let Ok(accumulated) = product.accumulated() else {
+            continue;
+        };
+        if manifest.quantity == Quantity::CarbonFlux
+            && manifests::latest(store, &accumulated).await?.is_none()
+        {
+            progress::say(&not_added_up(product));
+        }
+    }
+    Ok(())
+}
+
+fn not_added_up(product: &ProductId) -> String {
+    format!(
+        "{product} is a flux: `fluxglobe derive accumulated --product {product}` adds its carbon up in every cell, which lifts the particles of volumes"
+    )
 }
 
 /// The line; none where nothing is behind.
@@ -50,6 +79,15 @@ fn told(behind: &[ProductId], products: &[&ProductId]) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_flux_that_is_not_added_up_says_what_does_it() {
+        let line = not_added_up(&"flux".parse().unwrap());
+        assert!(
+            line.contains("`fluxglobe derive accumulated --product flux`"),
+            "{line}"
+        );
+    }
 
     #[test]
     fn what_is_behind_is_named_and_carbon_keeps_its_start() {

@@ -40,7 +40,7 @@ pub(crate) async fn run(settings: &Settings, options: &Budget) -> Result<()> {
     match form {
         Form::Json => return progress::result(&serde_json::to_string_pretty(&answer)?),
         Form::Csv => progress::result(&csv(&answer)?)?,
-        Form::Table => progress::result(&tables::of(&answer).to_string())?,
+        Form::Table => progress::result(&tables::of(&answer).trim_fmt())?,
     }
     say_what(&answer);
     say_besides(&answer);
@@ -89,7 +89,8 @@ async fn query(settings: &Settings, store: &Store, options: &Budget) -> Result<B
         Some(text) if file::is_file_name(text) => Some(file::text(Path::new(text))?),
         text => text.clone(),
     };
-    let besides = options.words(regions.as_deref()).asked()?;
+    let besides = options.words(regions.as_deref()).asked();
+    let besides = besides.map_err(|error| of_file(options.regions.as_deref(), error))?;
     let mut versions = BTreeMap::new();
     for product in besides.products() {
         let manifest = deployment::manifest(store, &product, &settings.data).await?;
@@ -105,6 +106,22 @@ async fn query(settings: &Settings, store: &Store, options: &Budget) -> Result<B
         ocean: ocean(settings, store, options.ocean.as_ref()).await?,
     };
     Ok(besides.of(wishes.query(options.product.product.clone()), &versions)?)
+}
+
+/// What is wrong with regions of a file is said of the file, and not of its text.
+fn of_file(regions: Option<&str>, error: ContractError) -> ContractError {
+    let name = regions.filter(|name| file::is_file_name(name));
+    match (name, error) {
+        (
+            Some(name),
+            ContractError::Invalid {
+                what: what @ "regions",
+                reason,
+                ..
+            },
+        ) => ContractError::invalid(what, name, reason),
+        (_, error) => error,
+    }
 }
 
 /// Millions of square kilometres with three decimals; what rounding leaves of nothing is nothing, and not below it.
@@ -185,7 +202,7 @@ fn say_history(form: Form, answer: &BudgetHistory) -> Result<()> {
     match form {
         Form::Json => return progress::result(&serde_json::to_string_pretty(answer)?),
         Form::Csv => progress::result(&csv(answer)?)?,
-        Form::Table => progress::result(&tables::of_history(answer).to_string())?,
+        Form::Table => progress::result(&tables::of_history(answer).trim_fmt())?,
     }
     progress::say(&format!(
         "{} of {}, positive out of the sea, by the {} of {} versions that changed it",
@@ -250,6 +267,20 @@ pub(crate) fn region(text: &str) -> Result<AskedRegion> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn regions_that_are_wrong_are_called_by_their_file() {
+        let wrong = || contract::region::named_regions("{\"type\":\"Point\"}").unwrap_err();
+        let told = of_file(Some("parts.geojson"), wrong()).to_string();
+        assert!(
+            told.starts_with("regions \"parts.geojson\" is not valid"),
+            "{told}"
+        );
+        let asked = "{\"type\":\"Point\"}";
+        assert_eq!(of_file(Some(asked), wrong()), wrong());
+        let other = || ContractError::invalid("river flux", "650", "say where it is from");
+        assert_eq!(of_file(Some("parts.geojson"), other()), other());
+    }
 
     #[test]
     fn nothing_has_no_sign() {

@@ -11,7 +11,7 @@ use observations::FileStore;
 use serde::Serialize;
 use storage::log::EventLog;
 
-use super::behind::say_what_is_behind;
+use super::behind::{say_what_is_behind, say_what_is_not_added_up};
 use crate::cli::{Ingest, Settings};
 use crate::progress::LandingBar;
 use crate::sink::Sink;
@@ -61,6 +61,15 @@ pub(crate) async fn run(settings: &Settings, options: Ingest) -> Result<ExitCode
         _ => None,
     });
     say_what_is_behind(&store, landed).await?;
+    let new = outcomes.iter().filter_map(|outcome| match outcome {
+        Outcome::Landed {
+            manifest,
+            revised: false,
+            ..
+        } => Some(&manifest.product),
+        _ => None,
+    });
+    say_what_is_not_added_up(&store, new).await?;
     // What landed is there and told of; it is only read faster along time for this.
     cube::compacted().await;
     Ok(if refused == 0 {

@@ -152,7 +152,7 @@ fn show(outcomes: &[Outcome], json: bool) -> Result<()> {
             version.compared_count.to_string(),
         ]);
     }
-    progress::result(&table.to_string())?;
+    progress::result(&table.trim_fmt())?;
     for outcome in outcomes {
         if let Some(reason) = &outcome.refused {
             progress::say(&format!("{}: {reason}", outcome.product));

@@ -9,6 +9,7 @@ use contract::manifest::AskedVersion;
 use contract::masked::MaskedCells;
 use contract::observation::{Filter, MAX_LIMIT, Observation, Quality};
 use contract::region::{MaskCode, Region};
+use contract::time::{Period, TimeMs};
 use observations::ObservationStore;
 
 use crate::cli::{MatchTime, Matchup, Observations, ObservationsAsked, Settings};
@@ -96,7 +97,7 @@ async fn list(settings: &Settings, asked: &ObservationsAsked) -> Result<()> {
         "kind",
         "from",
         "to",
-        "last place",
+        "last lon, lat",
         "values",
         "properties",
     ]);
@@ -113,7 +114,7 @@ async fn list(settings: &Settings, asked: &ObservationsAsked) -> Result<()> {
             p.properties.join(" "),
         ]);
     }
-    progress::result(&table.to_string())?;
+    progress::result(&table.trim_fmt())?;
     warn();
     Ok(())
 }
@@ -185,7 +186,8 @@ async fn query(settings: &Settings, asked: &ObservationsAsked) -> Result<()> {
     let mut table = Table::new();
     table.load_preset(NOTHING);
     table.set_header([
-        "time", "dataset", "platform", "place", "depth m", "property", "value", "unit", "flag",
+        "time", "dataset", "platform", "lon, lat", "depth m", "property", "value", "unit",
+        "quality",
     ]);
     for o in rows {
         table.add_row([
@@ -197,10 +199,10 @@ async fn query(settings: &Settings, asked: &ObservationsAsked) -> Result<()> {
             o.property,
             format!("{}", o.value),
             o.unit,
-            o.quality.flag().to_string(),
+            o.quality.to_string(),
         ]);
     }
-    progress::result(&table.to_string())?;
+    progress::result(&table.trim_fmt())?;
     warn();
     Ok(())
 }
@@ -254,14 +256,30 @@ struct Chosen {
     is_all: bool,
 }
 
-/// Up to the limit, those that are fit, page by page.
+/// The ends of the time of which observations are asked for: those of the product where they are left open. Others have no partner,
+/// and would take the places of those that have.
+fn window([from, to]: [Option<TimeMs>; 2], covered: Option<Period>) -> Result<[Option<TimeMs>; 2]> {
+    let start = from.or(covered.map(|period| period.start));
+    let end = to.or(covered.map(|period| period.end));
+    if let (Some(start), Some(end)) = (start, end)
+        && start >= end
+    {
+        bail!("there is no time from {start} to {end}: the product has nothing there");
+    }
+    Ok([start, end])
+}
+
+/// Up to the limit, those of a time that are fit, page by page.
 async fn chosen(
     store: &dyn ObservationStore,
     asked: &ObservationsAsked,
+    [from, to]: [Option<TimeMs>; 2],
     fit: Fit,
 ) -> Result<Chosen> {
     // What is not fit is counted: it is asked for, too.
     let mut filter = Filter {
+        from,
+        to,
         worst: Quality::Bad,
         limit: MAX_LIMIT,
         ..filter(asked)?
@@ -298,7 +316,9 @@ async fn matchup(settings: &Settings, options: &Matchup) -> Result<()> {
         worst: options.asked.worst.unwrap_or(Fit::default().worst),
         deepest_m: options.deepest,
     };
-    let chosen = chosen(found.as_ref(), &options.asked, fit).await?;
+    let covered = manifest.extent();
+    let window = window([options.asked.from, options.asked.to], covered)?;
+    let chosen = chosen(found.as_ref(), &options.asked, window, fit).await?;
     if chosen.observations.is_empty() {
         check_dataset(found.as_ref(), &options.asked).await?;
         if chosen.left_out != LeftOut::default() {
@@ -316,6 +336,14 @@ async fn matchup(settings: &Settings, options: &Matchup) -> Result<()> {
     matched.fit = Some(fit);
     matched.left_out.quality = chosen.left_out.quality;
     matched.left_out.depth = chosen.left_out.depth;
+    if matched.rows.is_empty() {
+        bail!(
+            "no observation has a value of {} beside it: {}; the product covers {}, and --from, --to and --region say which observations are taken",
+            matched.manifest,
+            without_partner(matched.left_out),
+            covered.map_or_else(|| "no time".to_owned(), |period| period.to_string())
+        );
+    }
     if let Some(file) = &options.plot {
         plot::write(file, &matchup::scatter_svg(&matched)?)?;
     }
@@ -336,6 +364,15 @@ async fn matchup(settings: &Settings, options: &Matchup) -> Result<()> {
     ));
     progress::say(&manifest.source);
     Ok(())
+}
+
+/// Why there is no pair at all.
+fn without_partner(out: LeftOut) -> String {
+    if out == LeftOut::default() {
+        "there is none of that time".to_owned()
+    } else {
+        left_out(out)
+    }
 }
 
 /// How a product and observations differ, one row in the unit that people read.
@@ -421,6 +458,26 @@ mod tests {
             text.contains("asked for") && !text.contains("ingest"),
             "{text}"
         );
+    }
+
+    #[test]
+    fn observations_of_the_time_of_the_product_are_compared_where_no_other_is_said() {
+        let covered = Period::year(2010).unwrap();
+        let (start, end) = (Some(covered.start), Some(covered.end));
+        assert_eq!(window([None, None], Some(covered)).unwrap(), [start, end]);
+        let march: TimeMs = "2010-03".parse().unwrap();
+        let asked = window([Some(march), None], Some(covered)).unwrap();
+        assert_eq!(asked, [Some(march), end]);
+        assert_eq!(window([None, None], None).unwrap(), [None, None]);
+        let after: TimeMs = "2012".parse().unwrap();
+        let refused = window([Some(after), None], Some(covered)).unwrap_err();
+        assert!(refused.to_string().contains("nothing there"), "{refused}");
+        let out = LeftOut {
+            no_data: 3,
+            ..LeftOut::default()
+        };
+        assert_eq!(without_partner(out), "3 in cells without data");
+        assert!(without_partner(LeftOut::default()).contains("none of that time"));
     }
 
     #[test]

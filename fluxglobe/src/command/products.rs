@@ -99,7 +99,7 @@ pub(crate) async fn run(settings: &Settings, options: &Products) -> Result<()> {
             row.manifest.to_string(),
         ]);
     }
-    progress::result(&table.to_string())?;
+    progress::result(&table.trim_fmt())?;
     for line in besides.iter().chain(&staying) {
         progress::say(line);
     }

@@ -169,7 +169,7 @@ fn show(
         "0".to_owned(),
         "0".to_owned(),
     ]);
-    progress::result(&table.to_string())?;
+    progress::result(&table.trim_fmt())?;
     progress::say(&format!(
         "for {}; {} are right as they are",
         plan.manifest,

@@ -75,5 +75,5 @@ fn list(refusals: &[rejected::Rejected], json: bool) -> Result<()> {
             refusal.detail.clone(),
         ]);
     }
-    progress::result(&table.to_string())
+    progress::result(&table.trim_fmt())
 }

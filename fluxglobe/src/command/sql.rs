@@ -160,7 +160,7 @@ async fn table(mut rows: Rows, most: usize) -> Result<String> {
             own.set_cell_alignment(CellAlignment::Right);
         }
     }
-    progress::result(&table.to_string())?;
+    progress::result(&table.trim_fmt())?;
     Ok(if is_cut {
         format!("the first {count} rows: --max-rows shows more, --output FILE writes all")
     } else {
@@ -200,6 +200,10 @@ async fn written(
             reached.set(Reached::Finishing);
         }
         tokio::task::spawn_blocking(move || file.finish()).await??;
+        if output.is_none() && matches!(form, AnswerFormat::Json) {
+            // What is said next stands on a line of its own.
+            progress::result("")?;
+        }
         Ok::<_, anyhow::Error>(count)
     };
     match writing.await {

@@ -33,6 +33,10 @@ impl Form {
     }
 }
 
+/// Said of a place, and of a line, at which no step has a value: what was meant otherwise looks the same.
+pub(super) const NOTHING_THERE: &str = "note: no step holds data at this place: it lies on land, or the product has a gap there; --lon is degrees east, --lat degrees north";
+const NOTHING_ALONG: &str = "note: no step holds data along this line: it lies on land, or the product has a gap there; of each of its places the longitude comes first";
+
 /// Asks, draws and prints.
 pub(crate) async fn run(
     settings: &Settings,
@@ -51,7 +55,7 @@ pub(crate) async fn run(
     match form {
         Form::Json => return progress::result(&serde_json::to_string_pretty(&answer)?),
         Form::Csv => progress::result(&csv(&answer)?)?,
-        Form::Table => progress::result(&table(&answer).to_string())?,
+        Form::Table => progress::result(&table(&answer).trim_fmt())?,
     }
     progress::say(&format!(
         "{}, {}; cite {}",
@@ -80,13 +84,32 @@ pub(crate) async fn run(
     for note in &answer.notes {
         progress::say(&format!("note: {note}"));
     }
+    if let Some(note) = nothing(&answer) {
+        progress::say(note);
+    }
     progress::say(&answer.cited.source);
     Ok(())
 }
 
+/// What is said where no row holds data; a region says it by itself.
+fn nothing(answer: &StatisticsAnswer) -> Option<&'static str> {
+    if answer.rows.iter().any(|row| row.coverage_percent > 0.0) {
+        return None;
+    }
+    match answer.size_unit.as_str() {
+        "1" => Some(NOTHING_THERE),
+        "m" => Some(NOTHING_ALONG),
+        _ => None,
+    }
+}
+
+fn is_point(answer: &StatisticsAnswer) -> bool {
+    answer.size_unit == "1"
+}
+
 /// What statistics are of, with its size; a point has none.
 fn taken(answer: &StatisticsAnswer) -> String {
-    if answer.size_unit == "1" {
+    if is_point(answer) {
         return format!("{} {}", answer.kind, answer.geometry);
     }
     format!(
@@ -155,6 +178,24 @@ mod tests {
     use serde_json::json;
 
     use super::*;
+
+    #[test]
+    fn a_place_and_a_line_without_data_are_told_to_be_so() {
+        let of = |unit: &str, coverage_percent: f64| {
+            let row = json!({"start": "2000-01-01T00:00:00Z", "end": "2000-02-01T00:00:00Z", "mid": "2000-01-16T12:00:00Z",
+                "values": {}, "coverage_percent": coverage_percent, "step_count": 1, "is_withheld": false});
+            let answer = json!({"product": "sst", "manifest": "sst@1-00000000", "title": "", "source": "", "synthetic": false,
+                "quantity": "sea_surface_temperature", "unit": "°C", "kind": "", "geometry": "", "step": "month",
+                "earth": "wgs84", "cells": "whole", "statistics": [], "coverage_basis": "", "size": 1.0, "size_unit": unit,
+                "min_coverage_percent": 0.0, "ocean_source": null, "notes": [], "rows": [row]});
+            nothing(&serde_json::from_value(answer).unwrap())
+        };
+        assert_eq!(of("1", 0.0), Some(NOTHING_THERE));
+        assert_eq!(of("m", 0.0), Some(NOTHING_ALONG));
+        for (unit, coverage_percent) in [("m²", 0.0), ("1", 50.0), ("m", 1.0)] {
+            assert_eq!(of(unit, coverage_percent), None);
+        }
+    }
 
     #[test]
     fn a_point_has_no_size_and_lies_on_no_figure_of_the_earth() {

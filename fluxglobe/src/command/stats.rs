@@ -13,7 +13,7 @@ use contract::series::{PointSeries, RegionSeries};
 use contract::statistics::{PointQuestion, RegionQuestion, StatisticsWishes};
 
 use crate::cli::{Settings, Stats, StatsLine, StatsPoint, StatsPolygon};
-use crate::figures::figures;
+use crate::figures::{figures, middle};
 use crate::instants::Instants;
 use crate::{deployment, plot, progress};
 
@@ -88,14 +88,16 @@ async fn point(settings: &Settings, options: &StatsPoint) -> Result<()> {
     if options.json {
         return progress::result(&serde_json::to_string_pretty(&answer)?);
     }
-    progress::result(&table(&answer).to_string())?;
+    progress::result(&table(&answer).trim_fmt())?;
     progress::say(&format!(
-        "{}, mean of the cell around {:.4}, {:.4}; cite {}",
+        "{}, mean of the cell around {}; cite {}",
         answer.cited.titled(),
-        answer.cell.lon_deg,
-        answer.cell.lat_deg,
+        middle(&answer.cell),
         answer.cited.manifest
     ));
+    if answer.series.iter().all(|step| step.value.is_none()) {
+        progress::say(statistics::NOTHING_THERE);
+    }
     progress::say(&answer.cited.source);
     Ok(())
 }
@@ -182,7 +184,7 @@ async fn polygon(settings: &Settings, options: &StatsPolygon) -> Result<()> {
     if options.json {
         return progress::result(&serde_json::to_string_pretty(&answer)?);
     }
-    progress::result(&region_table(&answer).to_string())?;
+    progress::result(&region_table(&answer).trim_fmt())?;
     progress::say(&format!(
         "{}, mean over {} ({:.3} 10⁶ km²), each cell by its area on the {} earth; cite {}",
         answer.cited.titled(),

@@ -45,6 +45,9 @@ pub(crate) async fn run(settings: &Settings, options: &Verify) -> Result<ExitCod
         }
     }
     progress::done(&bar, &summary(&report));
+    if keys.is_empty() {
+        progress::say("nothing is stored there: is it what --data or --store should name?");
+    }
     if options.json {
         progress::result(&serde_json::to_string_pretty(&report)?)?;
     }

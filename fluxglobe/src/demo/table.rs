@@ -86,7 +86,7 @@ pub(crate) async fn synthetic(engine: &Engine, flux: &Manifest) -> Result<String
             coverage,
         ]);
     }
-    Ok(table.to_string())
+    Ok(table.trim_fmt())
 }
 
 fn table(header: &[&str]) -> Table {

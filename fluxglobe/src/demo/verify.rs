@@ -15,6 +15,8 @@ use crate::{deployment, progress};
 
 /// Largest relative difference between the accumulated fields' sum and the printed budget.
 const MASS_TOLERANCE: f64 = 1e-6;
+/// Characters of a refusal that are shown.
+const SHOWN_CHARS: usize = 300;
 /// Paths that must answer 200.
 const PAGES: [&str; 5] = ["/", "/healthz", "/readyz", "/metrics", "/api/products"];
 
@@ -100,13 +102,13 @@ fn paths(flux: &Manifest) -> Vec<String> {
 fn fetch(base: &str, path: &str) -> Result<()> {
     let agent: ureq::Agent = ureq::Agent::config_builder()
         .timeout_global(Some(Duration::from_mins(2)))
+        .http_status_as_error(false)
         .build()
         .into();
-    let body = agent
-        .get(format!("{base}{path}"))
-        .call()?
-        .body_mut()
-        .read_to_vec()?;
+    let mut response = agent.get(format!("{base}{path}")).call()?;
+    let status = response.status();
+    let body = response.body_mut().read_to_vec()?;
+    anyhow::ensure!(status.is_success(), refusal(path, status.as_u16(), &body));
     anyhow::ensure!(!body.is_empty(), "an empty answer");
     if path.contains(".png") {
         let picture = image::load_from_memory(&body)
@@ -118,6 +120,18 @@ fn fetch(base: &str, path: &str) -> Result<()> {
         );
     }
     Ok(())
+}
+
+/// What an answer other than 200 says, and of the page itself what to do.
+fn refusal(path: &str, status: u16, body: &[u8]) -> String {
+    if path == "/" {
+        return format!(
+            "{status}: the viewer has not been built; `make viewer` builds it, and --viewer names the folder of one that is elsewhere"
+        );
+    }
+    let text = String::from_utf8_lossy(body);
+    let text: String = text.chars().take(SHOWN_CHARS).collect();
+    format!("{status}: {text}")
 }
 
 /// The accumulated fields must hold the mass that the budget says left the sea.
@@ -155,4 +169,17 @@ async fn mass(settings: &Settings, store: &Store, flux: &Manifest) -> Result<Opt
     let is_kept = difference <= MASS_TOLERANCE;
     Ok((!is_kept)
         .then(|| format!("accumulated fields hold {in_fields_tg} Tg C, the budget is {budget_tg}")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_does_not_answer_says_why() {
+        let page = refusal("/", 404, b"<html>");
+        assert!(page.contains("make viewer") && page.contains("--viewer"));
+        let tile = refusal("/tiles/a/map/0/0/0.png", 503, b"{\"error\":\"busy\"}");
+        assert_eq!(tile, "503: {\"error\":\"busy\"}");
+    }
 }

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use contract::analysis::{Hovmoller, SeriesAnalysis};
+use contract::analysis::{BasePeriod, Hovmoller, SeriesAnalysis};
 use contract::cited::Cited;
 use contract::time::{Period, TimeMs};
 use plotters::chart::ChartContext;
@@ -10,6 +10,8 @@ use plotters::prelude::{
     BLACK, Cartesian2d, ChartBuilder, Circle, Color as _, LineSeries, Polygon, RGBColor,
     SVGBackend, SeriesLabelPosition, WHITE,
 };
+
+use crate::figures::middle;
 
 use super::marked::{Marked, Marks};
 use super::page::{Area, COLOURS, Failed, with_unit};
@@ -52,9 +54,17 @@ pub(super) fn place(answer: &SeriesAnalysis) -> String {
         (Some(region), _, _) => format!("mean over {}", named(region)),
         (None, Some(line), _) => format!("mean along {}", named(line)),
         (None, None, Some(cell)) => {
-            format!("cell around {:.4}, {:.4}", cell.lon_deg, cell.lat_deg)
+            format!("cell around {}", middle(cell))
         }
         (None, None, None) => String::new(),
+    }
+}
+
+/// The years of a climatology, and of which of them the series has steps where these are not all.
+pub(super) fn years_of(answer: &SeriesAnalysis, base: BasePeriod) -> String {
+    match base.touched_by(period(answer.start, answer.end)) {
+        Some(held) if held != base => format!("{base} (steps in {held} alone)"),
+        _ => base.to_string(),
     }
 }
 

@@ -4,7 +4,7 @@ use anyhow::Result;
 use contract::analysis::{CalendarBins, Climatology, ClimatologyRow, SeriesAnalysis};
 use plotters::prelude::{BLACK, ChartBuilder, Circle, Color as _, LineSeries, Polygon};
 
-use super::chart::place;
+use super::chart::{place, years_of};
 use super::marked::Marks;
 use super::page::{self, Area, COLOURS, Failed, Words, range, with_unit};
 
@@ -20,7 +20,11 @@ pub(super) fn drawn(answer: &SeriesAnalysis, made: &Climatology) -> Result<Strin
     } else {
         "; no part of the year has two steps, so that there is no standard deviation"
     };
-    let below = format!("{} climatology of {}: mean{spread}", made.bins, made.base);
+    let below = format!(
+        "{} climatology of {}: mean{spread}",
+        made.bins,
+        years_of(answer, made.base)
+    );
     let words = Words::of(&answer.cited, &place(answer), below);
     page::drawn(&words, |area| on(area, answer, made))
 }

@@ -87,7 +87,7 @@ pub(super) fn drawn(answer: &Hovmoller, data: Period) -> Result<String> {
     };
     let [west, south, east, north] = answer.bounds_deg;
     let below = format!(
-        "means of bands of {} degrees{}, a {} a row, {west} to {east} degrees east, {south} to {north} degrees north; gray: {}",
+        "means of bands of {} degrees{}, over each {}, {west} to {east} degrees east, {south} to {north} degrees north; gray: {}",
         answer.band_deg,
         shares_of(answer),
         page::of_a_row(answer.step),

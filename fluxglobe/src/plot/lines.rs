@@ -6,7 +6,9 @@ use contract::cited::Cited;
 use contract::series::{PointSeries, RegionSeries};
 use plotters::prelude::{BLACK, Color as _, LineSeries, Rectangle};
 
-use super::chart::{Point, axis_of, chart, label, lines, named, period, place};
+use crate::figures::middle;
+
+use super::chart::{Point, axis_of, chart, label, lines, named, period, place, years_of};
 use super::page::{self, COLOURS, Words, range, with_unit};
 
 pub(super) fn of_point(answer: &PointSeries) -> Result<String> {
@@ -15,10 +17,7 @@ pub(super) fn of_point(answer: &PointSeries) -> Result<String> {
         .iter()
         .map(|step| (period(step.start, step.end), step.value))
         .collect();
-    let place = format!(
-        "cell around {:.4}, {:.4}",
-        answer.cell.lon_deg, answer.cell.lat_deg
-    );
+    let place = format!("cell around {}", middle(&answer.cell));
     series(&answer.cited, &place, &points)
 }
 
@@ -49,8 +48,9 @@ fn series(cited: &Cited, place: &str, points: &[Point]) -> Result<String> {
 
 pub(super) fn of_anomalies(answer: &SeriesAnalysis, made: &Anomalies) -> Result<String> {
     let below = format!(
-        "anomaly from the {} climatology of {}; above it red, below it blue",
-        made.bins, made.base
+        "anomaly from the {} climatology of {}; above it orange, below it blue",
+        made.bins,
+        years_of(answer, made.base)
     );
     let words = Words::of(&answer.cited, &place(answer), below);
     let points: Vec<Point> = made

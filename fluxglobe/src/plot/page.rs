@@ -136,7 +136,7 @@ fn style(size: i32, colour: &RGBColor) -> TextStyle<'static> {
     }
 }
 
-/// What one row is of.
+/// What one value is of.
 pub(super) fn of_a_row(step: TimeStep) -> &'static str {
     match step {
         TimeStep::Native => "step",

@@ -34,10 +34,14 @@ pub(super) fn of_statistics(answer: &StatisticsAnswer) -> Result<String> {
     };
     let (low, high) = (ends(-1.0), ends(1.0));
     let has_band = low.iter().any(|(_, value)| value.is_some());
+    let taken = match answer.kind.as_str() {
+        "area" => "of the region",
+        "line" => "along the line",
+        _ => "at the place",
+    };
     let below = format!(
-        "{} of {}, a row a {}{}{}",
+        "{} {taken}, over each {}{}{}",
         names.join(", "),
-        answer.kind,
         page::of_a_row(answer.step),
         if has_band {
             "; band: mean and one standard deviation on either side"

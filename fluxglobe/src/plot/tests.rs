@@ -57,6 +57,10 @@ fn a_climatology_is_a_line_of_means_in_a_band_of_spreads() {
     let svg = of_analysis(&analysis("climatology", made)).unwrap();
     is_told(&svg);
     assert!(svg.contains("2001/2010") && svg.contains("Jan") && svg.contains("Dec"));
+    assert!(!svg.contains("alone"), "all of its years have steps");
+    let made = json!({"bins": "month", "base": "1991/2020", "rows": rows});
+    let short = of_analysis(&analysis("climatology", made)).unwrap();
+    assert!(short.contains("1991/2020 (steps in 2001/2010 alone)"));
     // One month has no data and one no spread: three bands, and eleven dots.
     assert_eq!(
         (
@@ -183,7 +187,7 @@ fn bands_against_time_have_the_colours_of_the_quantity_and_a_bar_of_them() {
     made["min_coverage_percent"] = json!(40.0);
     made["left_out_count"] = json!(24);
     let svg = bands_of(made);
-    assert!(svg.contains("degrees of basins@1-0a1b2c3d:30 (north), a month a row"));
+    assert!(svg.contains("degrees of basins@1-0a1b2c3d:30 (north), over each month"));
     assert!(svg.contains("coverage of less than 40 %"));
 }
 
@@ -253,6 +257,7 @@ fn all_statistics_of_the_unit_are_drawn_and_others_named_and_too_many_refused() 
     }
     let lines = svg.lines().filter(|line| line.starts_with("<circle"));
     assert_eq!(lines.count(), 8 * 12);
+    assert!(svg.contains("max of the region, over each month"), "{svg}");
     assert!(svg.contains("not drawn, of another unit: count") && svg.contains("band: mean"));
     // Without a mean there is no band that it could be.
     let alone = of_statistics(&statistics_of(&[("std", "°C")])).unwrap();

@@ -101,7 +101,7 @@ pub(crate) struct PlannedStep {
 pub(crate) struct Wish<'a> {
     pub(crate) profile: Option<&'a Profile>,
     pub(crate) product: Option<&'a ProductId>,
-    /// The variable to land of a file that no profile is for.
+    /// The variable to land of a file that no profile is for; of another one it is the profile's, or refused.
     pub(crate) variable: Option<&'a str>,
     /// What that variable means, where it is known beyond what it says: a cube of this program.
     pub(crate) meaning: Option<Named>,
@@ -131,6 +131,9 @@ pub(crate) async fn run(
     } = granule;
     let fits = |profile: &&Profile| profile.is_for(&raw.file_name, &description);
     let profile = wish.profile.or_else(|| settings.profiles.iter().find(fits));
+    if let (None, Some(found), Some(asked)) = (wish.profile, profile, wish.variable) {
+        target::read_by(found, asked, &settings.profiles)?;
+    }
     let wish = Wish { profile, ..wish };
     let held = (Values::Process(Box::new(session)), &description);
     let plan = plan(held, &raw.file_name, wish, settings.limits).await?;

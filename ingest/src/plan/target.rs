@@ -11,7 +11,7 @@ use crate::plan::cf::main_variable::{self, listed};
 use crate::plan::cf::packing::{self, Packing};
 use crate::plan::cf::quantity::{Named, directions, has_direction, of_standard_name};
 use crate::plan::cf::{carbon_flux, open};
-use crate::plan::profile::Profile;
+use crate::plan::profile::{Profile, Profiles};
 use crate::plan::unit::Substance;
 
 /// Longest title and citation taken from a file, characters.
@@ -30,6 +30,26 @@ pub(super) fn choose<'a>(
     };
     let (variable, named) = choose_by_profile(file, profile)?;
     Ok((variable, named, None))
+}
+
+/// Is the variable that is asked for the one that the profile of the file reads? Landing another one in its place would tell
+/// nobody.
+pub(super) fn read_by(found: &Profile, asked: &str, all: &Profiles) -> Result<(), Rejection> {
+    let (name, reads) = (&found.name, &found.variable.name);
+    if asked == reads {
+        return Ok(());
+    }
+    let others = all.iter().filter(|other| other.variable.name == asked);
+    let others: Vec<&str> = others.map(|other| other.name.as_str()).collect();
+    let advice = if others.is_empty() {
+        "give a profile of your own for it".to_owned()
+    } else {
+        format!("one by this name is read by {}", others.join(", "))
+    };
+    let detail = format!(
+        "is not what is read of this file: the profile {name} is for it, and reads {reads}; say --profile in the place of --variable: {advice}"
+    );
+    Err(Rejection::new(RejectReason::NoVariable, asked, detail))
 }
 
 /// Without a profile: the variable that is asked for, or else the one that the file is about, as its standard name or, if

@@ -194,6 +194,42 @@ async fn of_several_variables_one_must_be_named_and_is_kept_when_files_are_read_
 }
 
 #[tokio::test]
+async fn a_variable_that_the_profile_of_a_file_does_not_read_is_refused_and_not_another_landed() {
+    let place = Place::new();
+    let (east, north) = (
+        "eastward_eulerian_current_velocity",
+        "northward_eulerian_current_velocity",
+    );
+    let current = |name| {
+        let half = Values::Floats(vec![0.5; 32]);
+        Made::new(name, &["time", "lat", "lon"], half).text("units", "m s-1")
+    };
+    let file = MadeFile::days(1).with(current(east)).with(current(north));
+    file.with(variable("slp", 1).text("units", "Pa"))
+        .write(&place.path("a.nc"));
+    let log: Arc<dyn storage::log::EventLog> = Arc::new(place.log.clone());
+    let service = IngestService::new(place.store.clone(), log, settings());
+    for name in ["slp", north, east] {
+        let of = Wishes {
+            variable: Some(name.to_owned()),
+            ..Wishes::default()
+        };
+        let notified = service.notify_of(&[place.path("a.nc")], &of).await;
+        notified.unwrap();
+    }
+    let outcomes = service.drain(&Quiet).await.unwrap();
+    for (outcome, advice) in [(0, "profile of your own"), (1, "globcurrent-north")] {
+        let (_, detail) = refusal(&outcomes[outcome..=outcome]);
+        assert!(
+            detail.contains("globcurrent-east") && detail.contains(advice),
+            "{detail}"
+        );
+    }
+    assert!(!outcomes[2].is_rejected(), "{}", outcomes[2]);
+    assert_eq!(place.newest("globcurrent-east").await.steps.len(), 1);
+}
+
+#[tokio::test]
 async fn statistics_and_what_is_named_by_another_are_not_what_a_file_is_about() {
     let place = Place::new();
     let file = MadeFile::days(2)

@@ -56,11 +56,13 @@ pub(crate) struct LegendQuery {
 pub(crate) async fn get(
     State(state): State<AppState>,
     UrlPath((product, file)): UrlPath<(String, String)>,
-    UrlQuery(query): UrlQuery<LegendQuery>,
+    query: Result<UrlQuery<LegendQuery>, ServerError>,
     asked: HeaderMap,
 ) -> Result<Response, ServerError> {
     let form = file.strip_prefix("legend.").and_then(Form::named);
+    // Of an address that is none, parameters are the lesser matter.
     let form = form.ok_or(ServerError::UnknownAddress)?;
+    let UrlQuery(query) = query?;
     let layer = state
         .catalogue
         .version(&product, query.manifest.as_deref())

@@ -86,6 +86,8 @@ struct Session {
     /// The newest picture that is not sent, and the highest number of one that is.
     ready: Option<Picture>,
     sent_id: Option<u64>,
+    /// The layer of the picture that was sent last.
+    shown: Option<String>,
     /// Pictures sent and not seen, oldest first.
     unseen: VecDeque<(u64, Instant)>,
     tells_seen: bool,
@@ -107,6 +109,11 @@ pub(crate) async fn run(server: AppState, socket: WebSocket, mut place: Place) {
     metrics.open.dec();
 }
 
+/// The product and the mode of a view: its address without parameters.
+fn layer(view: &str) -> &str {
+    view.split_once('?').map_or(view, |(path, _query)| path)
+}
+
 impl Session {
     fn new(server: AppState) -> Self {
         Self {
@@ -122,6 +129,7 @@ impl Session {
             full: None,
             ready: None,
             sent_id: None,
+            shown: None,
             unseen: VecDeque::new(),
             tells_seen: false,
             heard: Instant::now(),
@@ -332,6 +340,7 @@ impl Session {
             .with_label_values(&label)
             .observe(took_s);
         self.sent_id = Some(picture.header.id);
+        self.shown = Some(layer(&picture.header.view).to_owned());
         if kind == Kind::Moving {
             self.unseen.push_back((picture.header.id, Instant::now()));
             // Of a client that does not tell, none is waited for.
@@ -343,7 +352,8 @@ impl Session {
     }
 
     fn failed(&mut self, outbox: &Outbox, wish: Wish, error: &ServerError) -> Result<(), End> {
-        let was_shown = self.sent_id.is_some();
+        // What never was there is a state that is wrong, as another one.
+        let was_shown = self.shown.as_deref() == Some(layer(&wish.state.view));
         if error.status() == StatusCode::NOT_FOUND && was_shown {
             let text = error.to_string();
             return Err(End::told("removed", close_code::POLICY, text));

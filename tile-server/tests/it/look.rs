@@ -131,6 +131,9 @@ async fn a_legend_comes_in_three_forms() {
         .get_with(&format!("/api/products/sst/legend.png?{LOOK}"), &tag)
         .await;
     assert_eq!(again.status, StatusCode::NOT_MODIFIED);
+    // What is misspelt is the address, and not the parameters that go with it.
+    let none = app.get("/api/products/sst/piont?lon=1&lat=2").await;
+    assert_eq!(none.status, StatusCode::NOT_FOUND, "{}", none.text());
     let other = app.get_with("/api/products/sst/legend.png", &tag).await;
     assert_eq!(other.status, StatusCode::OK);
     assert_eq!(app.drawer.drawn_count(), 0);

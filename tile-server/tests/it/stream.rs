@@ -393,6 +393,19 @@ async fn a_product_that_is_removed_ends_its_streams_by_name() {
 }
 
 #[tokio::test]
+async fn a_product_that_never_was_there_is_a_state_that_is_wrong() {
+    let running = Running::new(|_usual| {}).await;
+    let mut camera = running.connect().await;
+    camera.look(1, VIEW).await;
+    camera.full().await;
+    camera.look(2, &VIEW.replace("/flux/", "/flx/")).await;
+    let error = camera.error().await;
+    assert_eq!((&error["id"], &error["status"]), (&json!(2), &json!(404)));
+    camera.look(3, &format!("{VIEW}&roll=1")).await;
+    assert_eq!(camera.full().await.0["id"], 3, "the stream goes on");
+}
+
+#[tokio::test]
 async fn a_server_that_stops_says_so_and_does_not_wait_for_cameras() {
     let mut running = Running::new(|_usual| {}).await;
     let mut camera = running.connect().await;

@@ -168,7 +168,11 @@ fn partial_pressure_and_fugacity_are_not_mixed_unless_one_is_converted() {
     ask(&both, "water - fco2_of_pco2_weiss1974(air, t, p)").unwrap();
     ask(&both[..1], "water").unwrap();
     let named = [of("pco2_water", Quantity::Fco2)];
-    assert!(said(ask(&named, "pco2_water")).contains("pco2_water holds CO₂ fugacity"));
+    let told = said(ask(&named, "pco2_water"));
+    assert!(
+        told.contains("pco2_water holds CO₂ fugacity") && told.contains("--fco2-water"),
+        "{told}"
+    );
 }
 
 #[test]

@@ -201,6 +201,8 @@ mod tests {
         );
         let flux = of(Quantity::CarbonFlux, MapStatistic::Anomaly);
         assert_eq!((flux.0, flux.1), ("carbon_flux_anomaly", "g m-2 year-1"));
+        let anomaly = super::of(Quantity::CarbonFlux, None, MapStatistic::Anomaly);
+        assert_eq!(anomaly.unwrap().0.display().unit, "g C m⁻² year⁻¹");
         assert!((flux.2 - 1000.0 * contract::quantity::SECONDS_PER_YEAR).abs() < 1e-3);
         assert_eq!(of(Quantity::Salinity, MapStatistic::Trend).1, "year-1");
         assert_eq!(

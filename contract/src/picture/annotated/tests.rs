@@ -1,5 +1,7 @@
 use super::*;
+use crate::analysis::{CalendarBins, CorrelationStatistic, MapStatistic};
 use crate::camera::CameraAngles;
+use crate::computed::{Computation, Computed, MapRequest};
 use crate::digest::Digest;
 use crate::grid::Grid;
 use crate::job::Mode;
@@ -8,7 +10,7 @@ use crate::manifest::{MANIFEST_SCHEMA, Step};
 use crate::picture::{PictureOptions, PictureRequest};
 use crate::product::ProductId;
 use crate::quantity::Quantity;
-use crate::time::Period;
+use crate::time::{Period, TimeStep};
 
 const GLOBE: View = View::Globe {
     lon_deg: 0.0,
@@ -167,6 +169,79 @@ fn a_product_of_one_step_is_named_by_it() {
     assert_eq!(
         label(Quantity::WindSpeed, six),
         "15 July 2000, 18:00 UTC | 6-hour means"
+    );
+}
+
+#[test]
+fn a_statistic_over_time_is_not_called_a_mean() {
+    let label = |quantity, how: Computation, base: Option<&str>, periods: Vec<Period>| {
+        let mut product = product("p", quantity, periods);
+        let map = base.map(|base| MapRequest {
+            base: base.parse().ok(),
+            bins: CalendarBins::Month,
+            anomaly_step: None,
+            region: None,
+            crop: false,
+            once: false,
+        });
+        product.computed = Some(Computed {
+            how,
+            inputs: vec![],
+            from: None,
+            to: None,
+            map,
+        });
+        let label = DateLabel::of(&product, "2000-07-15T18:00:00Z".parse().unwrap()).unwrap();
+        let note = label.note.map(String::from).unwrap_or_default();
+        format!("{} | {note}", label.shown.as_str())
+    };
+    let of = |statistic| Computation::Statistic {
+        statistic,
+        step: TimeStep::Month,
+        least_percent: 50,
+    };
+    let year = || vec![Period::year(2000).unwrap()];
+    let p90: MapStatistic = "p90".parse().unwrap();
+    for (statistic, expected) in [
+        (MapStatistic::Mean, "2000 | yearly mean"),
+        (MapStatistic::Max, "2000 | highest of this time"),
+        (MapStatistic::Min, "2000 | lowest of this time"),
+        (p90, "2000 | p90 of this time"),
+        (MapStatistic::Trend, "2000 | "),
+    ] {
+        let found = label(Quantity::WindSpeed, of(statistic), None, year());
+        assert_eq!(found, expected);
+    }
+    let correlation = Computation::Correlation {
+        statistic: CorrelationStatistic::Coefficient,
+        lag_steps: 0,
+        step: TimeStep::Month,
+        deseasonalised: false,
+        least_percent: 50,
+    };
+    assert_eq!(
+        label(Quantity::WindSpeed, correlation, None, year()),
+        "2000 | "
+    );
+    let climatology = of(MapStatistic::Climatology);
+    assert_eq!(
+        label(
+            Quantity::WindSpeed,
+            climatology.clone(),
+            Some("1991/2020"),
+            months()
+        ),
+        "15 July 2000 | climatology of 1991/2020"
+    );
+    // Of sums of carbon too: a map of the highest of them was not added up.
+    assert_eq!(
+        label(Quantity::AccumulatedCarbon, climatology, None, months()),
+        "15 July 2000 | climatology"
+    );
+    let highest = of(MapStatistic::Max);
+    assert_eq!(
+        label(Quantity::AccumulatedCarbon, highest, None, year()),
+        "2000 | highest of this time"
     );
 }
 

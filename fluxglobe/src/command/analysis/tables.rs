@@ -7,7 +7,7 @@ use contract::analysis::{
     Season, SeriesAnalysis, SeriesPlace, Trend,
 };
 
-use crate::figures::figures;
+use crate::figures::{figures, middle};
 use crate::instants::Instants;
 
 /// Numbers of a row of bands that are shown on one line.
@@ -22,10 +22,7 @@ pub(super) fn place(place: &SeriesPlace) -> String {
     match (&place.region, &place.line, &place.cell) {
         (Some(region), _, _) => format!("mean over {region}"),
         (None, Some(line), _) => format!("mean along {line}, each cell by the length in it"),
-        (None, None, Some(cell)) => format!(
-            "mean of the cell around {:.4}, {:.4}",
-            cell.lon_deg, cell.lat_deg
-        ),
+        (None, None, Some(cell)) => format!("mean of the cell around {}", middle(cell)),
         (None, None, None) => String::new(),
     }
 }
@@ -59,7 +56,7 @@ fn table(header: &[&str], first_number: usize, rows: impl Iterator<Item = Vec<St
     rows.for_each(|row| {
         table.add_row(row);
     });
-    table.to_string()
+    table.trim_fmt()
 }
 
 /// A text and the unit of its number; a number without a unit is of none.
