@@ -1,7 +1,6 @@
 //! Tests of a render worker as a whole, one binary.
 #![expect(
     clippy::unwrap_used,
-    clippy::print_stdout,
     reason = "all of this binary is tests; clippy allows these in test functions only"
 )]
 
