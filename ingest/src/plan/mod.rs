@@ -246,7 +246,8 @@ impl Planning<'_> {
         let parts = vec![Part::All; variable.dimensions.len()];
         let packing = Packing::of(variable).checked(variable)?;
         let stored = self.values.read(name, &parts, count).await?;
-        Ok(stored.into_iter().map(|v| packing.value(v)).collect())
+        let numbers = stored.into_iter().map(|v| packing.value(v)).collect();
+        Ok(coordinate::turned(variable, numbers))
     }
 
     /// The time axis, or a scalar time beside the axes.
