@@ -7,6 +7,7 @@ use super::period::{Covers, StampAt, between};
 
 const DAY_MS: i64 = 86_400_000;
 const HOUR_MS: i64 = 3_600_000;
+const WEEK_DAYS: u32 = 7;
 
 /// How long steps are, and where their stamps stand in them.
 #[derive(Debug, Clone, PartialEq)]
@@ -85,11 +86,12 @@ fn holding(
 /// Steps of days. Those of several days are counted from the first of January, as the makers of such composites do.
 fn of_days(days: u32, stamps: &[CalendarDate], times: &[i64]) -> Spacing {
     let of_day_ms = times[0].rem_euclid(DAY_MS);
-    // What goes on over New Year at one distance is not counted anew there.
-    let are_middles = stamps.iter().zip(times).all(|(stamp, time)| {
-        let place = day_of_year(*stamp, *time) % i64::from(days);
-        place != 0 && place == i64::from(days) / 2
-    });
+    // What goes on over New Year at one distance is not counted anew there, and weeks are counted by the day of the week.
+    let are_middles = days != WEEK_DAYS
+        && stamps.iter().zip(times).all(|(stamp, time)| {
+            let place = day_of_year(*stamp, *time) % i64::from(days);
+            place != 0 && place == i64::from(days) / 2
+        });
     let is_noon = of_day_ms * 2 == DAY_MS;
     let (at, assumption) = match (days, of_day_ms) {
         (1, _) if is_noon => (StampAt::Middle, None),
@@ -250,14 +252,19 @@ mod tests {
     }
 
     #[test]
-    fn weeks_that_go_on_over_new_year_are_not_counted_from_it() {
-        // 20 December is the middle of a week that is counted from 1 January 2003, and 3 January of none.
-        let weeks = [(2003, 12, 20), (2003, 12, 27), (2004, 1, 3)];
-        let weeks = weeks.map(|(year, month, day)| stamp(year, month, day, 0.0));
-        let start = "2003-12-20T00:00:00Z/2003-12-27T00:00:00Z".to_owned();
-        assert_eq!(told(&weeks), Some((start, true)));
-        let middle = "2003-12-17T00:00:00Z/2003-12-24T00:00:00Z".to_owned();
-        assert_eq!(told(&weeks[..2]), Some((middle, true)));
+    fn what_goes_on_over_new_year_is_not_counted_from_it_and_weeks_never_are() {
+        let all = |days: [(i32, u32, u32); 3]| {
+            days.map(|(year, month, day)| stamp(year, month, day, 0.0))
+        };
+        // 23 December is a middle of eight days that are counted from 1 January 2003, and 8 January is none.
+        let eight = all([(2003, 12, 23), (2003, 12, 31), (2004, 1, 8)]);
+        let start = "2003-12-23T00:00:00Z/2003-12-31T00:00:00Z".to_owned();
+        assert_eq!(told(&eight), Some((start, true)));
+        let middle = "2003-12-19T00:00:00Z/2003-12-27T00:00:00Z".to_owned();
+        assert_eq!(told(&eight[..2]), Some((middle, true)));
+        let week = all([(2003, 4, 26), (2003, 5, 3), (2003, 5, 10)]);
+        let start = "2003-04-26T00:00:00Z/2003-05-03T00:00:00Z".to_owned();
+        assert_eq!(told(&week), Some((start, true)));
     }
 
     #[test]
