@@ -158,6 +158,7 @@ pub(crate) async fn plan(
     if profile.is_none() && wish.meaning.is_none() {
         let time = planning.time_variable(&axes);
         method::check(variable, meaning.quantity, time.as_deref())?;
+        written::check(description, variable, meaning.quantity)?;
     }
     if matches!(meaning.quantity, Quantity::Open(_)) && open::stated_unit(variable).is_none() {
         planning.assume(format!(
@@ -167,9 +168,9 @@ pub(crate) async fn plan(
     }
     if profile.is_none() && matches!(meaning.quantity, Quantity::Open(_)) {
         let untold = || Some(carbon_flux::told(variable)?.err()?.note(&variable.name));
-        if let Some(note) = written::note(description, variable).or_else(untold) {
-            planning.assume(note);
-        }
+        let note = written::note(description, variable).or_else(untold);
+        let note = note.filter(|_| written::of_file(description, variable).is_none());
+        note.into_iter().for_each(|note| planning.assume(note));
     }
     let target = target::target(&planning, variable, wish, meaning.quantity)?;
     let steps = steps::convert(variable, profile, meaning, &periods)?;
