@@ -105,6 +105,11 @@ fn what_is_no_number_is_no_data_and_counted() {
     close(&found.values, &[f64::NAN, 20.0, f64::NAN, f64::NAN]);
     assert_eq!(found.not_finite, 2);
     assert_eq!(evaluate("sqrt(pco2 * pco2 * -1)").not_finite, 4);
+    for (power, of_half) in [("power(ice, -1)", 2.0), ("power(ice, -2)", 4.0)] {
+        let found = evaluate(power);
+        close(&found.values, &[f64::NAN, of_half, f64::NAN, f64::NAN]);
+        assert_eq!(found.not_finite, 2, "{power}");
+    }
 }
 
 /// Without ice 0 / 0, in the first cell and in the last, which is none by bits below or above every number.
