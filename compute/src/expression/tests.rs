@@ -232,6 +232,18 @@ fn mixed_units_and_whatever_is_no_arithmetic_are_refused_with_the_reason() {
     }
 }
 
+#[test]
+fn an_input_that_is_called_as_a_word_of_sql_is_told_how_it_is_written() {
+    let inputs = [
+        ("sst-2010".to_owned(), Unit::ONE),
+        ("any".to_owned(), Unit::ONE),
+    ];
+    let read = |text: &str| Expression::read(text, &inputs).map(|_| ());
+    let refused = read("any * 2").unwrap_err();
+    assert!(refused.contains("the input any is called as"), "{refused}");
+    assert_eq!(read("\"any\" * \"sst-2010\""), Ok(()));
+}
+
 /// Statistics are kept in units that people read.
 #[test]
 fn inputs_and_results_of_other_units_are_of_si_in_between() {

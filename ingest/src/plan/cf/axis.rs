@@ -260,7 +260,7 @@ fn regular(labels: &[f64], name: &str) -> Result<Regular, Rejection> {
     let Some(count) = count else {
         return Err(refused(
             name,
-            "has fewer than two labels, so the size of its cells is unknown; state the grid in a profile",
+            "has fewer than two labels, between which the size of cells is found; state the grid in a profile",
         ));
     };
     if let Some(bad) = labels.iter().find(|v| !v.is_finite() || v.abs() > 1e4) {
