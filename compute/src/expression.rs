@@ -19,7 +19,7 @@ use datafusion::arrow::datatypes::{DataType, Field, Float64Type, Schema, SchemaR
 use datafusion::common::{DFSchema, DataFusionError, SchemaError};
 use datafusion::execution::FunctionRegistry as _;
 use datafusion::execution::session_state::{SessionState, SessionStateBuilder};
-use datafusion::logical_expr::ScalarUDF;
+use datafusion::logical_expr::{Expr, ScalarUDF};
 use datafusion::physical_expr::PhysicalExpr;
 
 use rewrite::Outside;
@@ -91,8 +91,10 @@ impl Expression {
         let in_words = |e: DataFusionError| in_words(&e);
         let names = DFSchema::try_from(Arc::clone(&schema)).map_err(in_words)?;
         let parsed = STATE.create_logical_expr(text, &names);
-        let parsed =
-            parsed.map_err(|e| unknown_name(&e, text, inputs).unwrap_or_else(|| in_words(e)))?;
+        let parsed = parsed.map_err(|e| {
+            let told = unknown_name(&e, text, inputs).or_else(|| word_of_sql(inputs, &names));
+            told.unwrap_or_else(|| in_words(e))
+        })?;
         let parsed = rewrite::numbers(parsed).map_err(in_words)?;
         let units = inputs.iter().cloned().collect();
         let unit = match typed::typed(&parsed, &units)? {
@@ -254,6 +256,20 @@ fn unknown_name(error: &DataFusionError, text: &str, inputs: &[(String, Unit)]) 
         ""
     };
     Some(format!("{:?} is not an input; {there}{form}", field.name))
+}
+
+/// What is wrong with an input that is called as a word of SQL (`any`), if one is.
+fn word_of_sql(inputs: &[(String, Unit)], names: &DFSchema) -> Option<String> {
+    let is_column = |name: &str| {
+        let read = STATE.create_logical_expr(name, names);
+        matches!(read, Ok(Expr::Column(_)))
+    };
+    let is_word = |name: &str| name.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'_');
+    let mut names = inputs.iter().map(|(name, _unit)| name.as_str());
+    let name = names.find(|name| is_word(name) && !is_column(name))?;
+    Some(format!(
+        "the input {name} is called as a word of SQL is; call it otherwise, or write it in quotation marks, \"{name}\""
+    ))
 }
 
 /// Is a name written as the last of several arguments, as the unit of `unit(0.17, K)` and `unit(0.17, "K")` is?

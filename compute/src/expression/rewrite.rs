@@ -97,6 +97,7 @@ pub(super) fn runnable(expr: Expr, outside: &mut Outside) -> Result<Expr> {
                 let func = datafusion::functions::math::power();
                 Transformed::yes(Expr::ScalarFunction(ScalarFunction { func, args }))
             }
+            Expr::ScalarFunction(call) if call.func.name() == "power" => of_no_zero(call),
             Expr::ScalarFunction(call) => match Function::named(call.func.name()) {
                 Some(function) => {
                     let counter = outside.entry(function.name).or_default();
@@ -126,6 +127,26 @@ pub(super) fn runnable(expr: Expr, outside: &mut Outside) -> Result<Expr> {
         })
     };
     expr.transform_up(run).map(|done| done.data)
+}
+
+/// A power below zero as one over that above: the engine's of 0 ends the query, and one over 0 is no number, which is counted in its cell.
+fn of_no_zero(power: ScalarFunction) -> Transformed<Expr> {
+    let inverse = match power.args.as_slice() {
+        [base, Expr::Literal(ScalarValue::Float64(Some(exponent)), _)] if *exponent < 0.0 => {
+            vec![base.clone(), lit(-*exponent)]
+        }
+        _ => return Transformed::no(Expr::ScalarFunction(power)),
+    };
+    let power = Expr::ScalarFunction(ScalarFunction {
+        func: power.func,
+        args: inverse,
+    });
+    let (one, power) = (Box::new(lit(1.0)), Box::new(power));
+    Transformed::yes(Expr::BinaryExpr(BinaryExpr::new(
+        one,
+        Operator::Divide,
+        power,
+    )))
 }
 
 fn is_comparison(operator: Operator) -> bool {

@@ -105,6 +105,11 @@ fn what_is_no_number_is_no_data_and_counted() {
     close(&found.values, &[f64::NAN, 20.0, f64::NAN, f64::NAN]);
     assert_eq!(found.not_finite, 2);
     assert_eq!(evaluate("sqrt(pco2 * pco2 * -1)").not_finite, 4);
+    for (power, of_half) in [("power(ice, -1)", 2.0), ("power(ice, -2)", 4.0)] {
+        let found = evaluate(power);
+        close(&found.values, &[f64::NAN, of_half, f64::NAN, f64::NAN]);
+        assert_eq!(found.not_finite, 2, "{power}");
+    }
 }
 
 /// Without ice 0 / 0, in the first cell and in the last, which is none by bits below or above every number.
@@ -225,6 +230,18 @@ fn mixed_units_and_whatever_is_no_arithmetic_are_refused_with_the_reason() {
         assert!(refused.contains(reason), "{text}: {refused}");
         assert!(!refused.contains('\n'), "{refused}");
     }
+}
+
+#[test]
+fn an_input_that_is_called_as_a_word_of_sql_is_told_how_it_is_written() {
+    let inputs = [
+        ("sst-2010".to_owned(), Unit::ONE),
+        ("any".to_owned(), Unit::ONE),
+    ];
+    let read = |text: &str| Expression::read(text, &inputs).map(|_| ());
+    let refused = read("any * 2").unwrap_err();
+    assert!(refused.contains("the input any is called as"), "{refused}");
+    assert_eq!(read("\"any\" * \"sst-2010\""), Ok(()));
 }
 
 /// Statistics are kept in units that people read.

@@ -20,6 +20,8 @@ pub(super) const MAX_DOCUMENT_BYTES: u64 = 16 << 20;
 /// Largest object that is read at once.
 pub(super) const MAX_OBJECT_BYTES: u64 = 1 << 30;
 
+/// Numbers that JSON does not have.
+const BARE: [&[u8]; 3] = [b"NaN", b"Infinity", b"-Infinity"];
 /// Names of documents.
 const DOCUMENTS: [&str; 5] = ["zarr.json", ".zarray", ".zattrs", ".zgroup", ".zmetadata"];
 
@@ -54,8 +56,34 @@ impl Adapter {
         } else {
             MAX_OBJECT_BYTES
         };
-        self.objects.get(name, part, most_bytes).await
+        let is_whole = is_document && part.is_none();
+        let object = self.objects.get(name, part, most_bytes).await?;
+        Ok(object.map(|object| if is_whole { plain(object) } else { object }))
     }
+}
+
+/// A document of which numbers that JSON does not have, as the library of Zarr for Python writes those of attributes (`NaN`,
+/// `Infinity`, `-Infinity`), are the texts that Zarr has for them.
+pub(super) fn plain(document: Bytes) -> Bytes {
+    let mut whole = Vec::with_capacity(document.len());
+    let (mut is_text, mut at) = (false, 0);
+    while let Some(byte) = document.get(at) {
+        let is_here = |word: &&[u8]| !is_text && document[at..].starts_with(word);
+        if let Some(word) = BARE.into_iter().find(is_here) {
+            whole.push(b'"');
+            whole.extend_from_slice(word);
+            whole.push(b'"');
+            at += word.len();
+            continue;
+        }
+        is_text ^= *byte == b'"';
+        // A quotation mark behind it is of the text.
+        let count = if *byte == b'\\' { 2 } else { 1 };
+        let end = document.len().min(at + count);
+        whole.extend_from_slice(&document[at..end]);
+        at = end;
+    }
+    whole.into()
 }
 
 fn failed(error: &ForeignError) -> StorageError {
@@ -105,5 +133,27 @@ impl AsyncReadableStorageTraits for Adapter {
 
     fn supports_get_partial(&self) -> bool {
         true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_that_json_does_not_have_are_texts_and_texts_stay() {
+        let own = r#"{"a\"NaN": [NaN, -Infinity,Infinity, -1e5], "b": "NaN \\", "c": NaN}"#;
+        let read: serde_json::Value =
+            serde_json::from_slice(&plain(Bytes::from_static(own.as_bytes()))).unwrap();
+        let wanted = serde_json::json!({
+            "a\"NaN": ["NaN", "-Infinity", "Infinity", -1e5],
+            "b": "NaN \\",
+            "c": "NaN",
+        });
+        assert_eq!(read, wanted);
+        // What is cut off stays so.
+        for own in ["", "{\"a", "\\", "Na", "\"\\"] {
+            assert_eq!(plain(Bytes::from_static(own.as_bytes())), own.as_bytes());
+        }
     }
 }

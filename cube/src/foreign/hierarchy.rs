@@ -17,7 +17,7 @@ use zarrs::storage::{
 };
 use zarrs_icechunk::AsyncIcechunkStore;
 
-use super::adapter::{Adapter, MAX_DOCUMENT_BYTES};
+use super::adapter::{self, Adapter, MAX_DOCUMENT_BYTES};
 use super::array::{Absent, ForeignArray};
 use super::chunks::Chunks;
 use super::error::ForeignError;
@@ -408,7 +408,7 @@ async fn documents(
         Err(e) if kind == StoreKind::Zarr2 && e.cause == Cause::Access => None,
         content => content?,
     };
-    let Some(content) = content else {
+    let Some(content) = content.map(adapter::plain) else {
         return Ok(all);
     };
     let place = format!("{}/{name}", objects.place());

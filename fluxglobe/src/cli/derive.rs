@@ -74,7 +74,7 @@ pub(crate) enum DeriveWhat {
 #[derive(Debug, Args)]
 pub(crate) struct Expression {
     /// The expression, such as "wind * wind"; --help teaches it.
-    #[arg(long, required = true, requires_all = ["name", "quantity"])]
+    #[arg(long, required = true, requires_all = ["name", "quantity"], allow_hyphen_values = true)]
     pub(crate) expr: Option<String>,
     /// Product to land the result in.
     #[arg(long)]
@@ -289,4 +289,25 @@ fn input(text: &str) -> anyhow::Result<RequestedInput> {
         product,
         matching,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+
+    #[derive(Debug, Parser)]
+    struct Line {
+        #[command(flatten)]
+        expression: Expression,
+    }
+
+    #[test]
+    fn an_expression_may_begin_with_a_minus() {
+        let words = "derive --name open --quantity open:1 --input ice=sea-ice --expr";
+        let line = words.split(' ').chain(["-ice + 1"]);
+        let line = Line::try_parse_from(line).unwrap();
+        assert_eq!(line.expression.expr.as_deref(), Some("-ice + 1"));
+    }
 }

@@ -231,6 +231,10 @@ fn attribute(name: &str, value: &Value, kind: Kind) -> Option<AttributeValue> {
     let numbers: Vec<&Value> = match value {
         Value::Array(all) => all.iter().take(MAX_ATTRIBUTE_NUMBERS).collect(),
         Value::Number(_) | Value::Bool(_) => vec![value],
+        // What this program says of its own, as a file of NetCDF has it.
+        Value::Object(_) if name == cube::Description::ATTRIBUTE => {
+            return Some(AttributeValue::Text(cut(&value.to_string())));
+        }
         Value::Null | Value::Object(_) | Value::String(_) => return None,
     };
     let is_whole = numbers

@@ -8,7 +8,7 @@ use super::values::read;
 use crate::error::Stop;
 use crate::inspect::file::description::{Description, Dimension, Variable};
 use crate::inspect::reader::session::Session;
-use crate::plan::cf::coordinate::{Role, role_of};
+use crate::plan::cf::coordinate::{Role, role_of, turned};
 
 /// What a coordinate says.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -183,7 +183,7 @@ pub(super) async fn find(
     };
     Ok(Some(Coordinate {
         name: variable.name.clone(),
-        values: read(session, variable).await?,
+        values: turned(variable, read(session, variable).await?),
         steps,
     }))
 }

@@ -8,6 +8,7 @@ use crate::error::{Rejection, Stop};
 use crate::inspect::file::description::Part;
 use crate::plan::cf::calendar::CalendarDate;
 use crate::plan::cf::cell_methods::TimeMethod;
+use crate::plan::cf::packing::Packing;
 use crate::plan::cf::period;
 
 /// What a profile can state where bounds cannot be read.
@@ -92,8 +93,13 @@ async fn dates(
     }
     let parts = vec![Part::All; lens.len()];
     let unit = stamps::unit(planning, time, None, None)?;
+    // No fill value: in a store of Zarr 2 it may be the first instant.
+    let Packing { scale, offset, .. } = Packing::of(variable).checked(variable)?;
     let numbers = planning.values.read(bounds, &parts, count * 2).await?;
-    let date = |number: f64| unit.date(number).map_err(|e| refused(bounds, e));
+    let date = |number: f64| {
+        let date = unit.date(number * scale + offset);
+        date.map_err(|e| refused(bounds, e))
+    };
     let pair = |pair: &[f64]| Ok([date(pair[0])?, date(pair[1])?]);
     let pairs = numbers.chunks_exact(2).map(pair);
     Ok(Some(pairs.collect::<Result<_, Rejection>>()?))

@@ -6,6 +6,7 @@ use contract::grid::wrap_lon_deg;
 use super::{Planning, no_bounds};
 use crate::error::{Rejection, Stop};
 use crate::inspect::file::description::Part;
+use crate::plan::cf::coordinate;
 use crate::plan::cf::packing::Packing;
 
 /// How far bounds may be off, in cells: those of single precision are.
@@ -59,11 +60,15 @@ pub(super) async fn middles(
     // What is valid is said of labels, and edges may lie beyond.
     let packing = Packing::of(held).with_valid_values(f64::NEG_INFINITY, f64::INFINITY);
     let stored = planning.values.read(&bounds, &parts, count * 2);
-    let values: Vec<f64> = stored
+    let mut values: Vec<f64> = stored
         .await?
         .into_iter()
         .map(|it| packing.value(it))
         .collect();
+    // Bounds are in the units of what they bound.
+    if let Some(axis) = planning.file.variable(name) {
+        values = coordinate::turned(axis, values);
+    }
     let (edges, _none) = values.as_chunks::<2>();
     let found = otherwise(&labels, edges, along).map_err(|reason| {
         let detail = format!("{reason}; correct them, or state the grid in a profile");

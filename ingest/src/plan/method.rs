@@ -1,5 +1,5 @@
 //! What a variable holds of the time of its steps, where that is no mean: told by `cell_methods` (CF 7.3), and refused of what is taken for a
-//! mean, a value or a flux by its name.
+//! mean, a value or a flux by its name. So are differences of temperatures, told by `units_metadata`.
 
 use contract::event::RejectReason;
 use contract::quantity::Quantity;
@@ -35,6 +35,13 @@ pub(super) fn check(
     if matches!(quantity, Quantity::Open(_)) {
         return Ok(());
     }
+    if let Some(said) = of_differences(variable) {
+        let detail = format!(
+            "holds differences of temperatures (units_metadata {said:?}) and would be taken for {} itself; land it by a profile that gives it a quantity of its own",
+            quantity.title()
+        );
+        return Err(Rejection::new(RejectReason::Values, &variable.name, detail));
+    }
     let Some((method, what)) = other_over_time(variable, time) else {
         return Ok(());
     };
@@ -58,20 +65,42 @@ pub(crate) fn other_over_time(
         .find(|(method, _)| said.iter().any(|words| words[0] == *method))
 }
 
+/// What a variable says of its unit where its temperatures are differences of two, which have another zero (CF 1.11, 3.1.2).
+fn of_differences(variable: &Variable) -> Option<&str> {
+    let said = variable.attributes.text("units_metadata")?;
+    let words: Vec<&str> = said.split_whitespace().collect();
+    let is_so = |pair: &[&str]| pair == ["temperature:", "difference"];
+    words.windows(2).any(is_so).then_some(said)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::inspect::file::description::{AttributeValue, Kind};
 
-    fn said(methods: &str, quantity: Quantity) -> Result<(), Rejection> {
-        let text = AttributeValue::Text(methods.to_owned());
+    fn saying(name: &str, text: &str, quantity: Quantity) -> Result<(), Rejection> {
+        let text = AttributeValue::Text(text.to_owned());
         let variable = Variable {
             name: "v".to_owned(),
             dimensions: vec![],
             kind: Kind::Float(4),
-            attributes: [("cell_methods".to_owned(), text)].into_iter().collect(),
+            attributes: [(name.to_owned(), text)].into_iter().collect(),
         };
         check(&variable, quantity, Some("t"))
+    }
+
+    fn said(methods: &str, quantity: Quantity) -> Result<(), Rejection> {
+        saying("cell_methods", methods, quantity)
+    }
+
+    #[test]
+    fn differences_of_temperatures_are_not_taken_for_temperatures() {
+        let sst = |text| saying("units_metadata", text, Quantity::SeaSurfaceTemperature);
+        let refused = sst("temperature: difference").unwrap_err().detail;
+        assert!(refused.contains("differences"), "{refused}");
+        assert!(sst("temperature: on_scale").is_ok() && sst("temperature: unknown").is_ok());
+        let open = Quantity::open("bias", "degC", "Bias").unwrap();
+        assert!(saying("units_metadata", "temperature: difference", open).is_ok());
     }
 
     #[test]

@@ -163,6 +163,7 @@ pub(crate) async fn plan(
     if profile.is_none() && wish.meaning.is_none() {
         let time = planning.time_variable(&axes);
         method::check(variable, meaning.quantity, time.as_deref())?;
+        written::check(description, variable, meaning.quantity)?;
     }
     if matches!(meaning.quantity, Quantity::Open(_)) && open::stated_unit(variable).is_none() {
         planning.assume(format!(
@@ -172,9 +173,9 @@ pub(crate) async fn plan(
     }
     if profile.is_none() && matches!(meaning.quantity, Quantity::Open(_)) {
         let untold = || Some(carbon_flux::told(variable)?.err()?.note(&variable.name));
-        if let Some(note) = written::note(description, variable).or_else(untold) {
-            planning.assume(note);
-        }
+        let note = written::note(description, variable).or_else(untold);
+        let note = note.filter(|_| written::of_file(description, variable).is_none());
+        note.into_iter().for_each(|note| planning.assume(note));
     }
     let target = target::target(&planning, variable, wish, meaning.quantity)?;
     let steps = steps::convert(variable, profile, meaning, &periods)?;
@@ -296,7 +297,8 @@ impl<'a> Planning<'a> {
         let parts = vec![Part::All; variable.dimensions.len()];
         let packing = Packing::of(variable).checked(variable)?;
         let stored = self.values.read(name, &parts, count).await?;
-        Ok(stored.into_iter().map(|v| packing.value(v)).collect())
+        let numbers = stored.into_iter().map(|v| packing.value(v)).collect();
+        Ok(coordinate::turned(variable, numbers))
     }
 
     /// The time axis, or a scalar time beside the axes.

@@ -327,9 +327,8 @@ pub(super) fn convert(
     let own = open::stated_unit(variable);
     let bad = |detail: String| Rejection::new(RejectReason::Unit, &variable.name, detail);
     let missing = || bad("has no units attribute; state the unit in a profile".to_owned());
-    if let (Quantity::Open(_), None) = (meaning.quantity, profile) {
-        // In the unit that the file has, or in base units.
-        let factor = unit::canonical(own.unwrap_or("1")).map_or(1.0, |(_, factor)| factor);
+    if let (Quantity::Open(open), None) = (meaning.quantity, profile) {
+        let factor = factor_of_open(own.unwrap_or("1"), &open.words().unit).map_err(bad)?;
         let step = |(time_index, period): (usize, &Period)| PlannedStep {
             period: *period,
             time_index: time_index as u64,
@@ -355,4 +354,37 @@ pub(super) fn convert(
         })
     };
     periods.iter().enumerate().map(step).collect()
+}
+
+/// What values in a unit are multiplied by to be in that of their open quantity: in base units or, as this program writes what it computed, as
+/// they are. Units that are not read stay.
+fn factor_of_open(own: &str, unit: &str) -> Result<f64, String> {
+    match unit::canonical(own) {
+        _ if own == unit => Ok(1.0),
+        Some((base, factor)) if base == unit => Ok(factor),
+        Some(_) => Err(format!(
+            "has unit {own:?}, and what it holds is in {unit:?}; give it in that"
+        )),
+        None => Ok(1.0),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_in_the_unit_of_its_quantity_stays_and_other_units_come_to_it_or_are_refused() {
+        for (own, unit, factor) in [
+            ("km", "km", 1.0),
+            ("K year-1", "K year-1", 1.0),
+            ("hPa", "Pa", 100.0),
+            ("dB", "dB", 1.0),
+            ("1", "1", 1.0),
+        ] {
+            assert_eq!(factor_of_open(own, unit), Ok(factor), "{own}");
+        }
+        let refused = factor_of_open("hPa", "km").unwrap_err();
+        assert!(refused.contains("\"km\""), "{refused}");
+    }
 }

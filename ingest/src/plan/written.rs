@@ -1,15 +1,17 @@
 //! What a cube or an export of this program says of its own values, beyond what the conventions have names for.
 
 use contract::analysis::MapStatistic;
+use contract::event::RejectReason;
 use contract::quantity::Quantity;
 use cube::Description;
 use serde_json::{Map, Value};
 
+use crate::error::Rejection;
 use crate::inspect::file::description::{self, Variable};
 use crate::plan::cf::quantity::{Named, directions, has_direction};
 use crate::plan::unit::Substance;
 
-/// What it is of, if it was written by this program and this variable holds values of the quantity or means of them: the highest ones
+/// What it is of, if it was written by this program and this variable holds values of the quantity: means of them are such, the highest ones
 /// of a flux are none.
 pub(crate) fn description(attributes: &Map<String, Value>, variable: &str) -> Option<Description> {
     read(attributes, variable).filter(is_of_values)
@@ -25,8 +27,8 @@ pub(crate) fn meaning(own: &Description) -> Named {
     }
 }
 
-/// What a variable of a file means that `fluxglobe export` wrote, if that is built in. What was changed in such a file since says so
-/// by `units` and `positive`, as in any other.
+/// What a variable of a file means that `fluxglobe export` wrote. What was changed in such a file since says so by `units` and
+/// `positive`, as in any other.
 pub(crate) fn of_file(file: &description::Description, variable: &Variable) -> Option<Named> {
     let own = exported(file, variable).filter(is_of_values)?;
     let positive = variable.attributes.text("positive").unwrap_or_default();
@@ -38,9 +40,33 @@ pub(crate) fn of_file(file: &description::Description, variable: &Variable) -> O
     })
 }
 
-/// What is told of an export whose values are not those of its quantity.
+/// # Errors
+/// A percentile over time of a quantity that is built in, under the standard name of that: conventions have no method for it in
+/// `cell_methods`, which tell of other extremes.
+pub(crate) fn check(
+    file: &description::Description,
+    variable: &Variable,
+    quantity: Quantity,
+) -> Result<(), Rejection> {
+    let statistic = exported(file, variable).and_then(|own| own.statistic);
+    let (false, Some(MapStatistic::Percentile(_))) =
+        (matches!(quantity, Quantity::Open(_)), statistic)
+    else {
+        return Ok(());
+    };
+    let detail = format!(
+        "holds a percentile over time (its file was exported as such) and would be taken for {} itself; land it by a profile that gives it a quantity of its own, or give means",
+        quantity.title()
+    );
+    Err(Rejection::new(RejectReason::Values, &variable.name, detail))
+}
+
+/// What is told of an export whose values are not those of its quantity, where that is built in.
 pub(crate) fn note(file: &description::Description, variable: &Variable) -> Option<String> {
     let own = exported(file, variable).filter(|own| !is_of_values(own))?;
+    if matches!(own.quantity, Quantity::Open(_)) {
+        return None;
+    }
     let statistic = own.statistic?;
     Some(format!(
         "{}: holds the statistic {statistic} over time of {} and not that itself; it has no budget",
@@ -64,14 +90,15 @@ fn read(attributes: &Map<String, Value>, variable: &str) -> Option<Description> 
     (cube::cf::variable(own.quantity) == variable).then_some(own)
 }
 
+/// Trends and whatever else has a quantity of its own is of that; extremes and the like keep that of what they are of.
 fn is_of_values(own: &Description) -> bool {
-    matches!(own.statistic, None | Some(MapStatistic::Mean))
+    use MapStatistic::{Climatology, Max, Min, Percentile};
+    !matches!(own.statistic, Some(Min | Max | Percentile(_) | Climatology))
 }
 
-/// What an exported file says of a quantity that is built in.
+/// What an exported file, or a store, says of a variable.
 fn exported(file: &description::Description, variable: &Variable) -> Option<Description> {
-    let own = read(&said(file)?, &variable.name)?;
-    (!matches!(own.quantity, Quantity::Open(_))).then_some(own)
+    read(&said(file)?, &variable.name)
 }
 
 /// The attribute of an exported file that holds it, as a cube has it.
@@ -151,6 +178,26 @@ mod tests {
             }
         }
         assert!(!is_file_synthetic(&description::Description::default()));
+    }
+
+    #[test]
+    fn what_has_a_quantity_of_its_own_is_of_that_and_a_percentile_is_refused_as_another() {
+        let trend = Quantity::open("sst_trend", "K year-1", "Trend").unwrap();
+        let of = |quantity, statistic: &str| Description {
+            quantity,
+            ..of_flux(Some(statistic.parse().unwrap()))
+        };
+        let attributes = of(trend, "trend").attributes();
+        let own = description(&attributes, "sst_trend").unwrap();
+        assert_eq!(own.quantity, trend);
+        let highest = of(trend, "max").attributes();
+        assert!(description(&highest, "sst_trend").is_none());
+        for (statistic, is_fine) in [("p90", false), ("mean", true), ("climatology", true)] {
+            let (file, variable) = file(Some(statistic.parse().unwrap()), "up");
+            let found = check(&file, &variable, Quantity::CarbonFlux);
+            assert_eq!(found.is_ok(), is_fine, "{statistic}");
+            assert!(check(&file, &variable, trend).is_ok(), "{statistic}");
+        }
     }
 
     #[test]

@@ -1,6 +1,7 @@
-"""Makes the two fixtures of this folder with the netCDF library (python netCDF4), so that reader and writer share no code.
+"""Makes the fixtures of this folder with the netCDF library (python netCDF4), so that reader and writer share no code.
 
-Both hold the same: two months of sea-surface temperature on a 30-degree grid, packed in int16, south first, 0 to 360.
+Two hold the same: two months of sea-surface temperature on a 30-degree grid, packed in int16, south first, 0 to 360.
+The third is compressed with szip.
 """
 import netCDF4
 import numpy as np
@@ -42,3 +43,20 @@ for name, model in [("packed-cdf5.nc", "NETCDF3_64BIT_DATA"), ("packed-netcdf4.n
     else:
         d.history = "no time variable: see the test"
     d.close()
+
+d = netCDF4.Dataset("szip.nc", "w")
+d.createDimension("lat", 4)
+d.createDimension("lon", 8)
+lat = d.createVariable("lat", "f4", ("lat",))
+lat.units = "degrees_north"
+lat[:] = [67.5, 22.5, -22.5, -67.5]
+lon = d.createVariable("lon", "f4", ("lon",))
+lon.units = "degrees_east"
+lon[:] = np.arange(-157.5, 180, 45)
+sst = d.createVariable("sst", "f4", ("lat", "lon"), compression="szip")
+sst.units = "K"
+sst.standard_name = "sea_surface_temperature"
+sst[:] = 280
+d.time_coverage_start = "2003-05-01"
+d.time_coverage_end = "2003-05-31T23:59:59Z"
+d.close()

@@ -203,6 +203,35 @@ async fn values_are_those_that_xarray_finds_and_nothing_is_written_there() {
     }
 }
 
+/// Numbers that JSON does not have, as the library for Python writes them in attributes, of arrays beside each other and consolidated.
+#[tokio::test]
+async fn nan_in_the_attributes_of_a_store_is_read() {
+    let cases: [(&str, &str, fn(&mut Value) -> &mut Value); 3] = [
+        ("v2-plain.zarr", "sst/.zattrs", |it| it),
+        (
+            "v2-blosc.zarr",
+            ".zmetadata",
+            |it| &mut it["metadata"]["sst/.zattrs"],
+        ),
+        ("v3-gzip.zarr", "sst/zarr.json", |it| &mut it["attributes"]),
+    ];
+    for (name, document, attributes) in cases {
+        let own = Own::with(name);
+        own.edit(document, |it| {
+            attributes(it)["missing_value"] = json!("no number");
+        });
+        let path = own.path().join(document);
+        let text = std::fs::read_to_string(&path).unwrap();
+        std::fs::write(&path, text.replace("\"no number\"", "NaN")).unwrap();
+        own.attach().await.unwrap();
+        let newest = own.newest().await;
+        for (step, expected) in expected(name).iter().enumerate() {
+            let values = own.values(&newest, step).await.unwrap();
+            assert_same(&values, expected, &format!("{name} step {step}"));
+        }
+    }
+}
+
 /// Our own cube of a landed product is an Icechunk store like any other.
 #[tokio::test]
 #[expect(clippy::too_many_lines, reason = "one story of a store that goes on")]

@@ -345,6 +345,37 @@ async fn bounds_of_another_shape_are_refused_but_for_a_time_before_the_rest() {
     assert_refused(&narrow, &["lat_bnds: ", "no cells side by side"]).await;
 }
 
+/// What counts westwards and southwards is turned, its bounds too.
+#[tokio::test]
+async fn longitudes_in_degrees_west_lie_in_the_west() {
+    let west: Vec<f64> = (0..8).map(|col| 100.0 - 10.0 * f64::from(col)).collect();
+    let south = [40.0, 50.0, 60.0, 70.0];
+    let edges: Vec<[f64; 2]> = west.iter().map(|lon| [lon + 5.0, lon - 5.0]).collect();
+    let turned = |file: MadeFile| {
+        let file = file.but("lon", |v| v.text("units", "degrees_west"));
+        file.but("lat", |v| v.text("units", "degrees_south"))
+    };
+    let file = MadeFile::sst(2)
+        .numbers("lat", &south)
+        .numbers("lon", &west);
+    let bounded = turned(file.clone())
+        .but("lon", |v| v.text("bounds", "lon_bnds"))
+        .with(bounds("lon_bnds", "lon", &edges));
+    for file in [turned(file), bounded] {
+        let place = Place::new();
+        file.write(&place.path("a.nc"));
+        let outcome = place.land(&[place.path("a.nc")]).await.remove(0);
+        let told = assumed(&outcome);
+        assert!(told.iter().all(|line| !line.starts_with("l")), "{told:?}");
+        let Outcome::Landed { manifest, .. } = &outcome else {
+            panic!("{outcome}")
+        };
+        let grid = place.newest(manifest.product.as_str()).await.grid;
+        assert_eq!([grid.north_deg, grid.west_deg], [-35.0, -105.0]);
+        assert_eq!((grid.rows, grid.cols), (4, 8));
+    }
+}
+
 /// A Gaussian grid is evened out, by how much is told, and what is farther from even is refused.
 #[tokio::test]
 async fn latitudes_that_are_not_quite_even_are_told_of() {

@@ -301,6 +301,16 @@ async fn files_without_a_variable_to_land_say_what_they_hold() {
         &["no variable"],
     )
     .await;
+    let grouped = hdf5::File::create(place.path("groups.nc")).unwrap();
+    let group = grouped.create_group("physics").unwrap();
+    let inner = group
+        .new_dataset::<f32>()
+        .shape([2_usize])
+        .create("sst")
+        .unwrap();
+    drop((inner, group, grouped));
+    let words = ["nothing but groups (physics)", "ncks -G"];
+    assert_refused(&place, "groups.nc", RejectReason::NoVariable, &words).await;
     let profile = Profile::find("takahashi09-flux").unwrap();
     let (reason, line) = refusal(
         &place

@@ -240,6 +240,13 @@ async fn statistics_and_what_is_named_by_another_are_not_what_a_file_is_about() 
     let outcome = land(&place, &file).await;
     assert!(!outcome.is_rejected(), "{outcome}");
     place.newest("ocean-mean").await;
+    // Of nothing else there is nothing to choose, and that it is on no grid is not said.
+    let error = |v: Made| v.text("standard_name", "sea_surface_temperature standard_error");
+    let line = refused(&MadeFile::sst(2).but("sst", error)).await;
+    assert!(
+        line.contains("holds sst, there for others") && line.contains("--variable"),
+        "{line}"
+    );
 }
 
 /// Masks are called alike in files of one maker: each is a product of its own, and none revises another.

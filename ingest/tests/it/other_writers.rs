@@ -1,12 +1,13 @@
-//! Two committed files made by the netCDF library (`tests/data/make.py`): packed, south first, 0 to 360 degrees.
+//! Committed files made by the netCDF library (`tests/data/make.py`): two packed, south first, 0 to 360 degrees, and one in szip.
 
 use std::path::{Path, PathBuf};
 
+use contract::event::RejectReason;
 use contract::quantity::Quantity;
 use contract::time::Period;
 use ingest::Profile;
 
-use crate::fixture::Place;
+use crate::fixture::{Place, refusal};
 
 fn data(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -61,6 +62,16 @@ async fn a_netcdf4_file_of_the_netcdf_library_lands_with_its_time_bounds() {
         ],
     )
     .await;
+}
+
+/// The library has a name for szip, and is built without it.
+#[tokio::test]
+async fn szip_is_refused_by_its_name_and_not_as_damage() {
+    let place = Place::new();
+    let (reason, line) = refusal(&place.land(&[data("szip.nc")]).await);
+    assert_eq!(reason, RejectReason::Unreadable, "{line}");
+    assert!(line.contains("szip, which is not built in"), "{line}");
+    assert!(!line.contains("damaged"), "{line}");
 }
 
 #[tokio::test]

@@ -6,7 +6,7 @@ use contract::topic::Topic;
 use ingest::{Outcome, Profile};
 
 use crate::fixture::{Place, events, refusal};
-use crate::made::{Made, MadeFile, Values};
+use crate::made::{Made, MadeFile, Says, Values};
 
 /// Periods and assumptions of a file that lands.
 async fn told(file: &MadeFile, profile: Option<&Profile>) -> (Vec<Period>, Vec<String>) {
@@ -68,6 +68,20 @@ async fn bounds_say_it_whatever_the_stamps_are() {
         ]
     );
     assert_eq!(assumptions, Vec::<String>::new());
+}
+
+/// Packed in tenths, as their stamps are not.
+#[tokio::test]
+async fn bounds_that_are_packed_are_unpacked() {
+    let file = MadeFile::sst(2).numbers("time", &[0.5, 1.5]);
+    let file = with_bounds(file, "bounds", &[0.0, 10.0, 10.0, 20.0]);
+    let file = file.but("edges", |v| v.says("scale_factor", Says::Doubles(&[0.1])));
+    let (periods, _) = told(&file, None).await;
+    let days = [
+        period("2001-01-01", "2001-01-02"),
+        period("2001-01-02", "2001-01-03"),
+    ];
+    assert_eq!(periods, days);
 }
 
 #[tokio::test]

@@ -18,6 +18,21 @@ async fn of(draft: Draft) -> Vec<Observation> {
 }
 
 #[tokio::test]
+async fn a_buoy_whose_longitude_is_in_degrees_west_is_in_the_west() {
+    let axis = |draft: Draft, name: &'static str, units: &str, numbers: &[f64]| {
+        let dimension = if name == "time" { "time" } else { "place" };
+        draft.variable(name, &[dimension], &[("units", units)], numbers.to_vec())
+    };
+    let draft = Draft::new("timeSeries", &[("time", 3), ("place", 1)]);
+    let draft = axis(draft, "lon", "degree_west", &[164.05]);
+    let draft = axis(draft, "lat", "degrees_north", &[56.87]);
+    let draft = axis(draft, "time", "hours since 2000-01-01", &[1.0, 2.0, 3.0]);
+    let found = of(draft.variable("sst", &["time"], SST, vec![11.0, 12.0, 13.0])).await;
+    let places: Vec<(f64, f64)> = found.iter().map(|o| (o.lon_deg, o.lat_deg)).collect();
+    assert_eq!(places, [(-164.05, 56.87); 3]);
+}
+
+#[tokio::test]
 async fn errors_and_counts_beside_a_variable_are_no_flags_of_it() {
     let beside = [("ancillary_variables", "sst_error sst_count")];
     let draft = buoy(&beside)

@@ -28,6 +28,8 @@ const CHUNK_CACHE_BYTES: usize = 256 << 20;
 const CHUNK_CACHE_SLOTS: usize = 12_421;
 /// Largest single chunk, bytes: the library holds a chunk in memory whole.
 const MAX_CHUNK_BYTES: u128 = 512 << 20;
+/// Groups that are told where a file has nothing else.
+const TOLD_GROUPS: usize = 8;
 /// How a netCDF dimension without a coordinate variable is marked.
 const NO_VARIABLE: &str = "This is a netCDF dimension but not a netCDF variable";
 
@@ -165,7 +167,7 @@ fn describe(file: &File) -> Result<(Description, usize), Rejection> {
             ),
         )
     })?;
-    let mut variables = Vec::new();
+    let (mut variables, mut groups) = (Vec::new(), Vec::new());
     let (mut most_bytes, mut most_chunk_bytes) = (0, 0);
     for name in names {
         let damaged = |e: hdf5::Error| {
@@ -174,7 +176,11 @@ fn describe(file: &File) -> Result<(Description, usize), Rejection> {
             corrupt(&name, detail)
         };
         // A member that is no dataset (a group, a named type) is passed over. One that is damaged is not: it may be the flags of another.
-        if file.loc_type_by_name(&name).map_err(damaged)? != LocationType::Dataset {
+        let kind = file.loc_type_by_name(&name).map_err(damaged)?;
+        if kind == LocationType::Group {
+            groups.push(name.clone());
+        }
+        if kind != LocationType::Dataset {
             continue;
         }
         let dataset = file.dataset(&name).map_err(damaged)?;
@@ -183,6 +189,9 @@ fn describe(file: &File) -> Result<(Description, usize), Rejection> {
             most_chunk_bytes = most_chunk_bytes.max(chunk_bytes(&dataset).unwrap_or(0));
             variables.push(variable);
         }
+    }
+    if variables.is_empty() && !groups.is_empty() {
+        return Err(only_groups(&groups));
     }
     let format = if file.attr("_NCProperties").is_ok() || variables.iter().any(is_scale) {
         "NetCDF-4"
@@ -196,6 +205,16 @@ fn describe(file: &File) -> Result<(Description, usize), Rejection> {
         library_bytes: most_bytes,
     };
     Ok((description, most_chunk_bytes as usize))
+}
+
+/// A refusal of a file whose variables, if it has any, lie in groups.
+fn only_groups(groups: &[String]) -> Rejection {
+    let told = groups[..groups.len().min(TOLD_GROUPS)].join(", ");
+    let more = groups.get(TOLD_GROUPS).map_or("", |_| ", ...");
+    let detail = format!(
+        "holds nothing but groups ({told}{more}), and variables outside of groups are read; take them out (ncks -G : IN OUT)"
+    );
+    Rejection::new(RejectReason::NoVariable, "file", detail)
 }
 
 /// What is said of the file or of a dataset, by its name.
@@ -334,12 +353,15 @@ fn check_storage(name: &str, dataset: &Dataset) -> Result<(), Rejection> {
         return Err(Rejection::new(RejectReason::TooLarge, name, detail));
     }
     for filter in dataset.filters() {
-        if let Filter::User(id, _) = filter {
-            let detail = format!(
-                "is compressed with filter {id}, which is not built in; repack it with deflate"
-            );
-            return Err(Rejection::new(RejectReason::Unreadable, name, detail));
-        }
+        // Szip is one of the library's own, and not every library has it.
+        let what = match &filter {
+            Filter::User(id, _) => format!("filter {id}"),
+            Filter::SZip(..) if !filter.decode_enabled() => "szip".to_owned(),
+            _ => continue,
+        };
+        let detail =
+            format!("is compressed with {what}, which is not built in; repack it with deflate");
+        return Err(Rejection::new(RejectReason::Unreadable, name, detail));
     }
     Ok(())
 }

@@ -197,6 +197,12 @@ impl Mapping {
                           and if rows are centred on the poles, leave them out with registration = \"center_without_poles\"";
             return Err(refused(names[0], detail));
         }
+        if f64::from(cols) * dlon > 360.0 + TOLERANCE_CELLS * dlon {
+            let detail = format!(
+                "goes more than once round the earth ({cols} columns of {dlon:.6} degrees), so that places are there twice; give each once"
+            );
+            return Err(refused(names[1], &detail));
+        }
         grid.validate()
             .map_err(|e| refused(names[1], &format!("makes no grid ({e})")))?;
         Ok(Self {
@@ -254,7 +260,7 @@ fn regular(labels: &[f64], name: &str) -> Result<Regular, Rejection> {
     let Some(count) = count else {
         return Err(refused(
             name,
-            "has fewer than two labels, so the size of its cells is unknown; state the grid in a profile",
+            "has fewer than two labels, between which the size of cells is found; state the grid in a profile",
         ));
     };
     if let Some(bad) = labels.iter().find(|v| !v.is_finite() || v.abs() > 1e4) {
@@ -371,6 +377,17 @@ mod tests {
             .collect();
         let m = map(&north_first, &split, Registration::Center).unwrap();
         assert_eq!((m.grid, m.file_cols[0]), (ONE_DEGREE, 180));
+    }
+
+    #[test]
+    fn places_that_are_there_twice_are_refused_in_words() {
+        let lat = labels(-85.0, 10.0, 18);
+        // A column that is repeated at either end, and two at one.
+        for first in [-185.0, 0.0] {
+            let refused = map(&lat, &labels(first, 10.0, 38), Registration::Center);
+            let detail = refused.unwrap_err().detail;
+            assert!(detail.contains("38 columns"), "{detail}");
+        }
     }
 
     #[test]

@@ -229,9 +229,13 @@ impl TimeUnit {
     /// The date of a number of the axis, or what is wrong.
     pub(crate) fn date(self, number: f64) -> Result<CalendarDate, String> {
         let bad = || {
-            format!(
-                "time {number} lies outside the years 1 to 9998 or is no number; give the time in a profile"
-            )
+            let read = match self.reference.calendar {
+                Calendar::Standard => {
+                    "15 October 1582 (before which this calendar is Julian) to the year 9998"
+                }
+                _ => "the years 1 to 9998",
+            };
+            format!("time {number} lies outside {read} or is no number; give the time in a profile")
         };
         let CalendarDate {
             year,
@@ -405,6 +409,18 @@ mod tests {
         );
         assert_eq!(first.to_string(), "2004-03-01");
         assert!(TimeUnit::parse("days since 2004-02-29", calendar).is_err());
+    }
+
+    #[test]
+    fn dates_of_the_julian_calendar_are_refused_as_such() {
+        let of = |calendar: &str| {
+            let calendar = Calendar::parse(Some(calendar)).unwrap();
+            let unit = TimeUnit::parse("days since 850-01-01", calendar).unwrap();
+            unit.date(237_426.0).map(|date| date.year)
+        };
+        let refused = of("standard").unwrap_err();
+        assert!(refused.contains("15 October 1582"), "{refused}");
+        assert_eq!(of("proleptic_gregorian"), Ok(1500));
     }
 
     /// Numbers of 64 bits as other programs write them, whole seconds to the bit.

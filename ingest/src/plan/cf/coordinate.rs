@@ -58,14 +58,8 @@ pub(crate) fn evidence(variable: &Variable) -> Option<(Role, Evidence)> {
     if projection::of_coordinate(variable).is_some() {
         return None;
     }
-    match units.replace(' ', "_").as_str() {
-        "degrees_north" | "degree_north" | "degrees_n" | "degree_n" | "degreesn" | "degreen" => {
-            return Some((Role::Latitude, Evidence::Stated));
-        }
-        "degrees_east" | "degree_east" | "degrees_e" | "degree_e" | "degreese" | "degreee" => {
-            return Some((Role::Longitude, Evidence::Stated));
-        }
-        _ => {}
+    if let Some((role, _)) = of_units(variable) {
+        return Some((role, Evidence::Stated));
     }
     match standard_name.as_str() {
         "latitude" => return Some((Role::Latitude, Evidence::Stated)),
@@ -81,6 +75,33 @@ pub(crate) fn evidence(variable: &Variable) -> Option<(Role, Evidence)> {
         _ => return None,
     };
     Some((role, Evidence::NameAlone))
+}
+
+/// What the units of a variable make it, and whether they count against the way that this program does.
+fn of_units(variable: &Variable) -> Option<(Role, bool)> {
+    let units = variable.attributes.text("units")?.to_ascii_lowercase();
+    match units.replace(' ', "_").as_str() {
+        "degrees_north" | "degree_north" | "degrees_n" | "degree_n" | "degreesn" | "degreen" => {
+            Some((Role::Latitude, false))
+        }
+        "degrees_east" | "degree_east" | "degrees_e" | "degree_e" | "degreese" | "degreee" => {
+            Some((Role::Longitude, false))
+        }
+        "degrees_south" | "degree_south" => Some((Role::Latitude, true)),
+        "degrees_west" | "degree_west" | "degrees_w" | "degree_w" | "degreesw" | "degreew" => {
+            Some((Role::Longitude, true))
+        }
+        _ => None,
+    }
+}
+
+/// Numbers of a coordinate, northwards and eastwards: in `degrees_west` (UDUNITS: -1 degree east) they count the other way.
+pub(crate) fn turned(coordinate: &Variable, numbers: Vec<f64>) -> Vec<f64> {
+    match of_units(coordinate) {
+        // Nothing has no sign.
+        Some((_, true)) => numbers.into_iter().map(|number| 0.0 - number).collect(),
+        _ => numbers,
+    }
 }
 
 /// The axes of a variable, slowest first.

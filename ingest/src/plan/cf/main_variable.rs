@@ -102,6 +102,10 @@ pub(crate) fn of(file: &Description) -> Result<Chosen<'_>, Rejection> {
             Some(unread) => refused(format!("holds {}, which {NO_NUMBERS}", unread.name)),
             None => refused("holds no gridded variable; give a file with one".to_owned()),
         },
+        ([], [_, ..]) if !on_grid.is_empty() => refused(format!(
+            "holds {}, there for others by what names it or by the second word of its standard_name, and nothing else on a grid; {ADVICE}",
+            listed(on_grid.iter().copied())
+        )),
         ([], [first, ..]) => Err(coordinate::no_grid(file, first)),
         (several, _) => refused(format!(
             "has several gridded variables ({}), and no standard_name says which it is about; {ADVICE}",

@@ -7,6 +7,7 @@ use super::period::{Covers, StampAt, between};
 
 const DAY_MS: i64 = 86_400_000;
 const HOUR_MS: i64 = 3_600_000;
+const WEEK_DAYS: u32 = 7;
 
 /// How long steps are, and where their stamps stand in them.
 #[derive(Debug, Clone, PartialEq)]
@@ -48,7 +49,7 @@ pub(crate) fn of(stamps: &[CalendarDate]) -> Option<Spacing> {
         return None;
     }
     if let Some(days) = whole(low, DAY_MS, 366) {
-        return Some(of_days(days, stamps[0], times[0]));
+        return Some(of_days(days, stamps, &times));
     }
     let hours = whole(low, HOUR_MS, 8784)?;
     let phase_ms = times[0].rem_euclid(low);
@@ -83,18 +84,14 @@ fn holding(
 }
 
 /// Steps of days. Those of several days are counted from the first of January, as the makers of such composites do.
-fn of_days(days: u32, first: CalendarDate, first_time: i64) -> Spacing {
-    let of_day_ms = first_time.rem_euclid(DAY_MS);
-    let new_year = CalendarDate {
-        month: 1,
-        day: 1,
-        second: 0.0,
-        ..first
-    };
-    let day_of_year = new_year
-        .count_ms()
-        .map_or(0, |start| (first_time - start).div_euclid(DAY_MS));
-    let place = day_of_year % i64::from(days);
+fn of_days(days: u32, stamps: &[CalendarDate], times: &[i64]) -> Spacing {
+    let of_day_ms = times[0].rem_euclid(DAY_MS);
+    // What goes on over New Year at one distance is not counted anew there, and weeks are counted by the day of the week.
+    let are_middles = days != WEEK_DAYS
+        && stamps.iter().zip(times).all(|(stamp, time)| {
+            let place = day_of_year(*stamp, *time) % i64::from(days);
+            place != 0 && place == i64::from(days) / 2
+        });
     let is_noon = of_day_ms * 2 == DAY_MS;
     let (at, assumption) = match (days, of_day_ms) {
         (1, _) if is_noon => (StampAt::Middle, None),
@@ -108,7 +105,7 @@ fn of_days(days: u32, first: CalendarDate, first_time: i64) -> Spacing {
         ),
         // The middle of an odd number of days is a noon.
         (n, _) if is_noon && n % 2 == 1 => (StampAt::Middle, None),
-        (n, 0) if place != 0 && place == i64::from(n) / 2 => (
+        (_, 0) if are_middles => (
             StampAt::Middle,
             Some("stamps are taken for the middles of steps that are counted from 1 January"),
         ),
@@ -122,6 +119,18 @@ fn of_days(days: u32, first: CalendarDate, first_time: i64) -> Spacing {
         at: Some(at),
         assumption,
     }
+}
+
+/// Days since the start of the year of a stamp, of which the time is given, in its own calendar.
+fn day_of_year(stamp: CalendarDate, time: i64) -> i64 {
+    let new_year = CalendarDate {
+        month: 1,
+        day: 1,
+        second: 0.0,
+        ..stamp
+    };
+    let start = new_year.count_ms();
+    start.map_or(0, |start| (time - start).div_euclid(DAY_MS))
 }
 
 /// The periods for which values at instants stand: half way to the neighbours. At least two instants, which rise.
@@ -240,6 +249,22 @@ mod tests {
         assert_eq!(told(&days(5, 8, 0.0)), Some((eight, true)));
         let five = "2001-01-01T00:00:00Z/2001-01-06T00:00:00Z".to_owned();
         assert_eq!(told(&days(3, 5, 12.0)), Some((five, false)));
+    }
+
+    #[test]
+    fn what_goes_on_over_new_year_is_not_counted_from_it_and_weeks_never_are() {
+        let all = |days: [(i32, u32, u32); 3]| {
+            days.map(|(year, month, day)| stamp(year, month, day, 0.0))
+        };
+        // 23 December is a middle of eight days that are counted from 1 January 2003, and 8 January is none.
+        let eight = all([(2003, 12, 23), (2003, 12, 31), (2004, 1, 8)]);
+        let start = "2003-12-23T00:00:00Z/2003-12-31T00:00:00Z".to_owned();
+        assert_eq!(told(&eight), Some((start, true)));
+        let middle = "2003-12-19T00:00:00Z/2003-12-27T00:00:00Z".to_owned();
+        assert_eq!(told(&eight[..2]), Some((middle, true)));
+        let week = all([(2003, 4, 26), (2003, 5, 3), (2003, 5, 10)]);
+        let start = "2003-04-26T00:00:00Z/2003-05-03T00:00:00Z".to_owned();
+        assert_eq!(told(&week), Some((start, true)));
     }
 
     #[test]
