@@ -13,6 +13,10 @@ use super::ring::Ring;
 const COORDINATE_BITS: i32 = 30;
 /// Finest lattice, as a power of two of points in a degree: doubles at 720 degrees are no finer.
 const FINEST_BITS: i32 = 42;
+/// Edges beyond which the library cuts them at lines of longitude.
+const MOST_UNCUT: usize = 16_000;
+/// Steps that it may take to one such cut of an edge: some microseconds.
+const MOST_STEPS: u64 = 1 << 14;
 
 /// Points that are a power of two apart, so that whole and half degrees lie on it.
 #[derive(Debug, Clone, Copy)]
@@ -71,13 +75,42 @@ pub(super) fn difference(subject: &[IntContour], others: &[IntContour]) -> IntSh
     // With the corners of straight lines in it, the library (4.5.2) makes points without an end of half of all regions that have some
     // along a coast, and of others areas that are 6 % too small.
     let options = IntOverlayOptions::keep_output_points();
-    let mut overlay = Overlay::with_contours_custom(subject, others, options, Solver::default());
+    let solver = solver(&[subject, others]);
+    let mut overlay = Overlay::with_contours_custom(subject, others, options, solver);
     let rule = if others.is_empty() {
         OverlayRule::Subject
     } else {
         OverlayRule::Difference
     };
     overlay.overlay(rule, FillRule::NonZero)
+}
+
+/// How the library finds what crosses.
+///
+/// Of very many edges it (4.5.2) cuts each at up to some hundred lines of longitude, and goes to the latitude of a cut by steps of the
+/// lattice, from a place that is the further off the longer the edge is: of one across the world up to 2²⁷ steps a cut, which together take
+/// seconds for each such edge. Where there are such edges all are taken as they are, each beside those that it meets in longitude.
+fn solver(contours: &[&[IntContour]]) -> Solver {
+    let mut contours = contours.iter().copied().flatten();
+    let count: usize = contours.clone().map(Vec::len).sum();
+    let is_long = |contour: &IntContour| {
+        let mut edges = contour.iter().zip(contour.iter().cycle().skip(1));
+        edges.any(|(from, to)| steps_to_a_cut(*from, *to) > MOST_STEPS)
+    };
+    if count > MOST_UNCUT && contours.any(is_long) {
+        Solver::LIST
+    } else {
+        Solver::default()
+    }
+}
+
+/// Most steps that the library takes to the latitude of one cut of an edge.
+fn steps_to_a_cut(from: IntPoint, to: IntPoint) -> u64 {
+    let [width, height] = [from.x.abs_diff(to.x), from.y.abs_diff(to.y)].map(u64::from);
+    match (width * height).checked_ilog2() {
+        Some(log) => width >> (63 - log),
+        None => 0,
+    }
 }
 
 /// A ring without the corners that lie on the line from the one before to the one after.
@@ -127,4 +160,40 @@ pub(super) fn edges<'a>(contours: impl Iterator<Item = &'a IntContour>) -> Vec<[
         .collect();
     edges.sort_unstable();
     edges
+}
+
+#[cfg(test)]
+mod tests {
+    use i_overlay::core::solver::Strategy;
+
+    use super::*;
+
+    fn contour(corners: &[[i32; 2]]) -> IntContour {
+        let points = corners.iter().map(|&[x, y]| IntPoint::new(x, y));
+        points.collect()
+    }
+
+    #[test]
+    fn edges_across_the_lattice_are_not_cut_among_very_many_others() {
+        let half = 1 << 29;
+        let [diagonal, upright] = [
+            [[-half, -half], [half, half], [-half, half]],
+            [[-half, -half], [half, -half], [half, half]],
+        ]
+        .map(|corners| contour(&corners));
+        let short: Vec<[i32; 2]> = (0..20_000).map(|at| [at, at % 2]).collect();
+        let (coast, few) = (contour(&short), contour(&short[..100]));
+        let strategy = |subject: &IntContour, other: &IntContour| {
+            let [subject, other] = [subject, other].map(std::slice::from_ref);
+            solver(&[subject, other]).strategy
+        };
+        assert_eq!(strategy(&diagonal, &coast), Strategy::List);
+        assert_eq!(strategy(&coast, &diagonal), Strategy::List);
+        assert_eq!(strategy(&diagonal, &few), Strategy::Auto);
+        // The last edge goes back to the first corner.
+        assert_eq!(strategy(&upright, &coast), Strategy::List);
+        assert_eq!(strategy(&coast, &few), Strategy::Auto);
+        let level = contour(&[[-half, 0], [half, 0], [half, 9], [-half, 9]]);
+        assert_eq!(strategy(&level, &coast), Strategy::Auto);
+    }
 }
