@@ -2,6 +2,7 @@
 //! the time limit, the limit on bodies, and tags of answers.
 
 pub(crate) mod body;
+pub(crate) mod encoding;
 pub(crate) mod panics;
 pub(crate) mod security;
 pub(crate) mod tag;
