@@ -15,8 +15,8 @@ const COORDINATE_BITS: i32 = 30;
 const FINEST_BITS: i32 = 42;
 /// Edges beyond which the library cuts them at lines of longitude.
 const MOST_UNCUT: usize = 16_000;
-/// Steps that it may take to one such cut of an edge: some microseconds.
-const MOST_STEPS: u64 = 1 << 14;
+/// Steps of the lattice that take as long as it takes to see whether two edges cross.
+const STEPS_A_PAIR: f64 = 4.0;
 
 /// Points that are a power of two apart, so that whole and half degrees lie on it.
 #[derive(Debug, Clone, Copy)]
@@ -87,17 +87,30 @@ pub(super) fn difference(subject: &[IntContour], others: &[IntContour]) -> IntSh
 
 /// How the library finds what crosses.
 ///
-/// Of very many edges it (4.5.2) cuts each at up to some hundred lines of longitude, and goes to the latitude of a cut by steps of the
-/// lattice, from a place that is the further off the longer the edge is: of one across the world up to 2²⁷ steps a cut, which together take
-/// seconds for each such edge. Where there are such edges all are taken as they are, each beside those that it meets in longitude.
+/// Of very many edges it (4.5.2) cuts each at lines of longitude, and goes to the latitude of a cut by steps of the lattice, from a place that
+/// is the further off the longer the edge is: of one across the world up to 2²⁷ steps a cut, which together take seconds for each such edge.
+/// Where that is more work than to hold each edge against those that it meets in longitude, edges are taken as they are.
 fn solver(contours: &[&[IntContour]]) -> Solver {
-    let mut contours = contours.iter().copied().flatten();
-    let count: usize = contours.clone().map(Vec::len).sum();
-    let is_long = |contour: &IntContour| {
-        let mut edges = contour.iter().zip(contour.iter().cycle().skip(1));
-        edges.any(|(from, to)| steps_to_a_cut(*from, *to) > MOST_STEPS)
+    let edges = || {
+        let contours = contours.iter().copied().flatten();
+        contours.flat_map(|contour| contour.iter().zip(contour.iter().cycle().skip(1)))
     };
-    if count > MOST_UNCUT && contours.any(is_long) {
+    let count = edges().count();
+    if count <= MOST_UNCUT {
+        return Solver::default();
+    }
+    let ends = edges().fold([i32::MAX, i32::MIN], |[west, east], (from, _to)| {
+        [west.min(from.x), east.max(from.x)]
+    });
+    let all_wide = f64::from(ends[0].abs_diff(ends[1])).max(1.0);
+    let count = count as f64;
+    let (mut steps, mut pairs) = (0.0, 0.0);
+    for (from, to) in edges() {
+        let share = f64::from(from.x.abs_diff(to.x)) / all_wide;
+        steps += steps_to_a_cut(*from, *to) as f64 * (share * count.sqrt() + 1.0);
+        pairs += share * count;
+    }
+    if steps > STEPS_A_PAIR * pairs {
         Solver::LIST
     } else {
         Solver::default()
@@ -174,7 +187,7 @@ mod tests {
     }
 
     #[test]
-    fn edges_across_the_lattice_are_not_cut_among_very_many_others() {
+    fn long_edges_are_not_cut_among_very_many_others() {
         let half = 1 << 29;
         let [diagonal, upright] = [
             [[-half, -half], [half, half], [-half, half]],
@@ -195,5 +208,12 @@ mod tests {
         assert_eq!(strategy(&coast, &few), Strategy::Auto);
         let level = contour(&[[-half, 0], [half, 0], [half, 9], [-half, 9]]);
         assert_eq!(strategy(&level, &coast), Strategy::Auto);
+        // One in the other.
+        let nested = (1..=5000_i32).map(|at| at << 16);
+        let nested: Vec<_> = nested
+            .map(|to| contour(&[[to, 0], [0, to], [-to, 0], [0, -to]]))
+            .collect();
+        assert_eq!(solver(&[&nested, &[]]).strategy, Strategy::List);
+        assert_eq!(solver(&[&nested[..100], &[]]).strategy, Strategy::Auto);
     }
 }
