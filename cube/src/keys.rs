@@ -126,7 +126,9 @@ impl Keys {
             }));
         }
         // The library finds a chunk at `timec/0` too, and takes `c/0` for a chunk of the group, which is an error.
-        if !key.ends_with(ARRAY_METADATA) && chunk_of(key).is_none() {
+        let array = key.strip_suffix(ARRAY_METADATA);
+        let is_metadata = array.is_some_and(|array| !array.is_empty());
+        if !is_metadata && chunk_of(key).is_none() {
             return Ok(None);
         }
         match self.store.get(key, range).await {

@@ -76,6 +76,7 @@ async fn what_there_is_not_is_not_found() {
         ("flux/c/0/0/0", "nothing at this address"),
         ("flux/c/c/c/0", "nothing at this address"),
         ("flux/timec/0", "nothing at this address"),
+        ("flux//zarr.json", "nothing at this address"),
         ("flux/time/c/+0", "nothing at this address"),
         ("flux/time/c/00", "nothing at this address"),
         ("nothing/zarr.json", "no product"),
