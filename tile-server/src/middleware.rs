@@ -1,5 +1,5 @@
-//! What every request passes, from the outside in: counting, security headers, other origins, compression, panics,
-//! the time limit, the limit on bodies, and tags of answers.
+//! What every request passes, from the outside in: counting, security headers, other origins, what compression leaves unsaid,
+//! compression, panics, the time limit, the limit on bodies, and tags of answers.
 
 pub(crate) mod body;
 pub(crate) mod encoding;
