@@ -4,6 +4,7 @@
 
 use ballista_core::error::BallistaError;
 use datafusion::error::DataFusionError;
+use storage::attached;
 
 /// Whether waiting helps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -78,11 +79,21 @@ pub(crate) fn of_ballista(error: &BallistaError) -> Failure {
 }
 
 fn of_store(error: &object_store::Error) -> Failure {
+    if may_pass(error) {
+        Failure::Passing
+    } else {
+        Failure::Lasting
+    }
+}
+
+/// May the same read of an object store succeed later? What is wrong with a store of others stays so.
+pub(crate) fn may_pass(error: &object_store::Error) -> bool {
     match error {
         object_store::Error::Generic { .. } | object_store::Error::JoinError { .. } => {
-            Failure::Passing
+            let of_others = attached::Failure::behind(error);
+            of_others.is_none_or(attached::Failure::is_retryable)
         }
-        _ => Failure::Lasting,
+        _ => false,
     }
 }
 

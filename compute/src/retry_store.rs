@@ -21,6 +21,8 @@ use object_store::{
 };
 use retry::{Backoff, Retryable as _};
 
+use crate::failure::may_pass;
+
 /// How long one read is tried here; stores behind a network have tried for long before.
 const RETRY_LIMIT: Duration = Duration::from_secs(5);
 /// The largest part of an object that is fetched as one: more is handed on as it comes.
@@ -58,11 +60,6 @@ impl Display for RetryStore {
     fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
         write!(f, "store {}", self.inner)
     }
-}
-
-/// May the same read succeed later?
-fn may_pass(error: &Error) -> bool {
-    matches!(error, Error::Generic { .. } | Error::JoinError { .. })
 }
 
 /// The same failure; whoever looks for the root of one that may pass finds an I/O error.
@@ -160,12 +157,14 @@ mod tests {
     use object_store::memory::InMemory;
     use std::sync::atomic::{AtomicU32, Ordering};
     use std::time::Instant;
+    use storage::attached::{Cause, Failure};
 
     /// Fails the first reads.
     #[derive(Debug)]
     struct Failing {
         inner: InMemory,
         left: AtomicU32,
+        with: fn() -> Box<dyn std::error::Error + Send + Sync>,
     }
 
     impl Display for Failing {
@@ -195,7 +194,7 @@ mod tests {
             if left.is_ok() {
                 return Err(Error::Generic {
                     store: "failing",
-                    source: "500 Internal Server Error".into(),
+                    source: (self.with)(),
                 });
             }
             self.inner.get_opts(at, o).await
@@ -218,15 +217,32 @@ mod tests {
     }
 
     async fn failing(times: u32) -> (Arc<Failing>, RetryStore) {
+        failing_with(times, || "500 Internal Server Error".into()).await
+    }
+
+    async fn failing_with(
+        times: u32,
+        with: fn() -> Box<dyn std::error::Error + Send + Sync>,
+    ) -> (Arc<Failing>, RetryStore) {
         let inner = InMemory::new();
         inner.put(&Path::from("a"), "content".into()).await.unwrap();
         let failing = Arc::new(Failing {
             inner,
             left: AtomicU32::new(times),
+            with,
         });
         let mut store = RetryStore::new(Arc::clone(&failing) as Arc<dyn ObjectStore>);
         store.retry_limit = Duration::from_secs(2);
         (failing, store)
+    }
+
+    fn changed() -> Box<dyn std::error::Error + Send + Sync> {
+        let failure = Failure {
+            place: "s3://b/x array sst".to_owned(),
+            reason: "the store has changed since it was attached".to_owned(),
+            cause: Cause::Content,
+        };
+        failure.into()
     }
 
     #[tokio::test]
@@ -255,6 +271,15 @@ mod tests {
             matches!(error.find_root(), DataFusionError::IoError(_)),
             "{error:?}"
         );
+    }
+
+    #[tokio::test]
+    async fn a_store_of_others_that_has_changed_is_not_waited_for() {
+        let (failing, store) = failing_with(u32::MAX, changed).await;
+        let error = store.head(&Path::from("a")).await.unwrap_err();
+        let tries = u32::MAX - failing.left.load(Ordering::Relaxed);
+        assert_eq!(tries, 1, "{error}");
+        assert!(Failure::behind(&error).is_some(), "{error:?}");
     }
 
     #[tokio::test]

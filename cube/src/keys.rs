@@ -16,6 +16,8 @@ use crate::{At, CubeError, Description, Repository};
 
 /// Metadata of the group, or of an array in its folder.
 const METADATA: &str = "zarr.json";
+/// The same of an array, below its name.
+const ARRAY_METADATA: &str = "/zarr.json";
 
 /// One state of a cube, by keys. It does not change.
 pub struct Keys {
@@ -123,6 +125,12 @@ impl Keys {
                 _ => whole.clone(),
             }));
         }
+        // The library finds a chunk at `timec/0` too, and takes `c/0` for a chunk of the group, which is an error.
+        let array = key.strip_suffix(ARRAY_METADATA);
+        let is_metadata = array.is_some_and(|array| !array.is_empty());
+        if !is_metadata && chunk_of(key).is_none() {
+            return Ok(None);
+        }
         match self.store.get(key, range).await {
             Ok(content) => Ok(Some(content)),
             Err(e) if is_absent(&e.kind) => Ok(None),
@@ -154,12 +162,21 @@ fn chunk_of(key: &str) -> Option<(Path, ChunkIndices)> {
         Some(array) => (array, ""),
         None => key.split_once("/c/")?,
     };
-    let index: Result<Vec<u32>, _> = match index {
-        "" => Ok(vec![]),
-        index => index.split('/').map(str::parse).collect(),
+    let index: Option<Vec<u32>> = match index {
+        "" => Some(vec![]),
+        index => index.split('/').map(place).collect(),
     };
+    if array.is_empty() {
+        return None;
+    }
     let path = Path::new(&format!("/{array}")).ok()?;
-    Some((path, ChunkIndices(index.ok()?)))
+    Some((path, ChunkIndices(index?)))
+}
+
+/// A place along an axis, as it is written: another spelling of it is another key, which is not there.
+fn place(text: &str) -> Option<u32> {
+    let place: u32 = text.parse().ok()?;
+    (place.to_string() == text).then_some(place)
 }
 
 #[cfg(test)]
@@ -179,6 +196,14 @@ mod tests {
             "flux/zarr.json",
             "flux/c/a",
             "flux/c/1/-1",
+            "flux/c/+1",
+            "flux/c/01",
+            "fluxc/0",
+            "c",
+            "c/0",
+            "c/c/c/0",
+            "/c/0",
+            "/c",
             ".zgroup",
         ] {
             assert_eq!(of(none), None, "{none}");

@@ -130,6 +130,11 @@ pub enum ServerError {
         "geometries are sent as they are, as content-type application/geo+json or application/json"
     )]
     NoGeoJson,
+    /// No form of an answer that there is suits who asks.
+    #[error(
+        "answers are sent as they are, or compressed by gzip: let the header Accept-Encoding allow one of both, without \"identity;q=0\" or \"*;q=0\", or leave it out"
+    )]
+    NoEncoding,
     /// What the request carries cannot be taken apart.
     #[error("the body is not valid: {reason}")]
     Body { reason: String },
@@ -208,6 +213,7 @@ impl ServerError {
             | Self::UnknownDataset { .. } => StatusCode::NOT_FOUND,
             Self::ReadOnly | Self::AskedOnly => StatusCode::METHOD_NOT_ALLOWED,
             Self::NoGeoJson => StatusCode::UNSUPPORTED_MEDIA_TYPE,
+            Self::NoEncoding => StatusCode::NOT_ACCEPTABLE,
             Self::Unchanged => StatusCode::PRECONDITION_FAILED,
             Self::BodyTooLarge { .. } => StatusCode::PAYLOAD_TOO_LARGE,
             Self::NoRange { .. } => StatusCode::RANGE_NOT_SATISFIABLE,

@@ -27,7 +27,8 @@ const RETRY_AFTER: &str = "Seconds after which the same request may succeed";
     info(
         title = "Fluxglobe",
         description = "Map tiles, views of the globe, series, carbon budgets, the catalogue and observations.\n\n\
-            Everything is read with GET or HEAD, by anybody; other methods are answered with 405. Where a geometry may be too long \
+            Everything is read with GET or HEAD, by anybody; other methods are answered with 405, and whose `Accept-Encoding` allows \
+            neither gzip nor an answer as it is, with 406. Where a geometry may be too long \
             for an address, POST with it as the body asks the same and writes nothing. Times are ISO 8601 and \
             any instant is valid, not only stored steps; `from` and `to` bound the half-open period `[from, to)`. \
             Answers about a product name its version in `manifest`, and the parameter of that name asks for it again. \

@@ -17,7 +17,7 @@ use tower_http::cors::{Any, CorsLayer};
 use crate::client;
 use crate::error::ServerError;
 use crate::middleware::body::{self, Takes};
-use crate::middleware::{panics::CountPanics, security, tag, track};
+use crate::middleware::{encoding, panics::CountPanics, security, tag, track};
 use crate::routes::picture::{COVERED, HEIGHTS_END, HEIGHTS_WITHIN, SHOWN_TIME, TILT_WITH_GROUND};
 use crate::routes::{
     analysis, area, budget, check, correlation, difference, events, globe, health, hovmoller,
@@ -102,6 +102,7 @@ pub fn router(state: AppState) -> Router {
             .layer(from_fn_with_state(state.clone(), track::count))
             .map_response(security::with_headers)
             .layer(other_origins(takes))
+            .map_response(encoding::told)
             .layer(CompressionLayer::new().compress_when(compressible()))
             .layer(CatchPanicLayer::custom(CountPanics(
                 state.metrics.panics.clone(),

@@ -13,7 +13,7 @@ use utoipa::IntoParams;
 
 use crate::catalogue::Catalogue;
 use crate::error::ServerError;
-use crate::extract::number;
+use crate::extract::{number, time};
 use crate::ground::flag;
 use crate::request::{Beside, VectorAt};
 
@@ -101,7 +101,7 @@ impl SurroundingsQuery {
             coastlines,
             isolines: self.isolines.as_deref().map(str::parse).transpose()?,
             trails: self.trails.as_deref().map(str::parse).transpose()?,
-            trails_time: self.trails_time.as_deref().map(str::parse).transpose()?,
+            trails_time: time(self.trails_time.as_deref())?,
             height_exaggeration: real(
                 "height_exaggeration",
                 &self.height_exaggeration,
@@ -238,6 +238,10 @@ mod tests {
                 "sun=time"
             ]
         );
+        // A plus sign is a space to a query.
+        query.trails_time = Some("2002-01-15T02:00:00 02:00".to_owned());
+        let again = query.of_tiles().unwrap();
+        assert_eq!(again[4], "trails_time=2002-01-15T00:00:00Z");
         query.relief = Some("a&b".to_owned());
         assert!(query.of_tiles().is_err());
         assert!(SurroundingsQuery::default().is_empty() && !query.is_empty());

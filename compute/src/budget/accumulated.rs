@@ -72,11 +72,13 @@ fn completeness(
 /// Time with data since the start of accumulation, ms, `[row, col]`.
 type WithData = Vec<i64>;
 
-/// Stored counts at any instant; the last one read is kept, because a row begins where the one before it ends.
+/// Stored counts at any instant; the last two read are kept, because a row begins where the one before it ends, and an instant within a
+/// step takes the counts of both of its ends.
 struct Counted<'a> {
     store: &'a Store,
     manifest: &'a Manifest,
-    last: Option<(ObjectKey, WithData)>,
+    /// The newest first.
+    last: [Option<(ObjectKey, WithData)>; 2],
 }
 
 impl<'a> Counted<'a> {
@@ -84,7 +86,7 @@ impl<'a> Counted<'a> {
         Self {
             store,
             manifest,
-            last: None,
+            last: [None, None],
         }
     }
 
@@ -118,13 +120,15 @@ impl<'a> Counted<'a> {
         let Some(counted) = &step.contributed else {
             return Ok(None);
         };
-        if let Some((_, with_data)) = self.last.as_ref().filter(|(key, _)| *key == counted.counts) {
+        let mut last = self.last.iter().flatten();
+        if let Some((_, with_data)) = last.find(|(key, _)| *key == counted.counts) {
             return Ok(Some(with_data.clone()));
         }
         let grid = &self.manifest.grid;
         let counts = contributed::read(self.store, &counted.counts, grid).await?;
         let with_data = counts.milliseconds;
-        self.last = Some((counted.counts.clone(), with_data.clone()));
+        self.last.rotate_right(1);
+        self.last[0] = Some((counted.counts.clone(), with_data.clone()));
         Ok(Some(with_data))
     }
 }

@@ -13,6 +13,10 @@ use super::ring::Ring;
 const COORDINATE_BITS: i32 = 30;
 /// Finest lattice, as a power of two of points in a degree: doubles at 720 degrees are no finer.
 const FINEST_BITS: i32 = 42;
+/// Edges beyond which the library cuts them at lines of longitude.
+const MOST_UNCUT: usize = 16_000;
+/// Steps of the lattice that take as long as it takes to see whether two edges cross.
+const STEPS_A_PAIR: f64 = 4.0;
 
 /// Points that are a power of two apart, so that whole and half degrees lie on it.
 #[derive(Debug, Clone, Copy)]
@@ -71,13 +75,55 @@ pub(super) fn difference(subject: &[IntContour], others: &[IntContour]) -> IntSh
     // With the corners of straight lines in it, the library (4.5.2) makes points without an end of half of all regions that have some
     // along a coast, and of others areas that are 6 % too small.
     let options = IntOverlayOptions::keep_output_points();
-    let mut overlay = Overlay::with_contours_custom(subject, others, options, Solver::default());
+    let solver = solver(&[subject, others]);
+    let mut overlay = Overlay::with_contours_custom(subject, others, options, solver);
     let rule = if others.is_empty() {
         OverlayRule::Subject
     } else {
         OverlayRule::Difference
     };
     overlay.overlay(rule, FillRule::NonZero)
+}
+
+/// How the library finds what crosses.
+///
+/// Of very many edges it (4.5.2) cuts each at lines of longitude, and goes to the latitude of a cut by steps of the lattice, from a place that
+/// is the further off the longer the edge is: of one across the world up to 2²⁷ steps a cut, which together take seconds for each such edge.
+/// Where that is more work than to hold each edge against those that it meets in longitude, edges are taken as they are.
+fn solver(contours: &[&[IntContour]]) -> Solver {
+    let edges = || {
+        let contours = contours.iter().copied().flatten();
+        contours.flat_map(|contour| contour.iter().zip(contour.iter().cycle().skip(1)))
+    };
+    let count = edges().count();
+    if count <= MOST_UNCUT {
+        return Solver::default();
+    }
+    let ends = edges().fold([i32::MAX, i32::MIN], |[west, east], (from, _to)| {
+        [west.min(from.x), east.max(from.x)]
+    });
+    let all_wide = f64::from(ends[0].abs_diff(ends[1])).max(1.0);
+    let count = count as f64;
+    let (mut steps, mut pairs) = (0.0, 0.0);
+    for (from, to) in edges() {
+        let share = f64::from(from.x.abs_diff(to.x)) / all_wide;
+        steps += steps_to_a_cut(*from, *to) as f64 * (share * count.sqrt() + 1.0);
+        pairs += share * count;
+    }
+    if steps > STEPS_A_PAIR * pairs {
+        Solver::LIST
+    } else {
+        Solver::default()
+    }
+}
+
+/// Most steps that the library takes to the latitude of one cut of an edge.
+fn steps_to_a_cut(from: IntPoint, to: IntPoint) -> u64 {
+    let [width, height] = [from.x.abs_diff(to.x), from.y.abs_diff(to.y)].map(u64::from);
+    match (width * height).checked_ilog2() {
+        Some(log) => width >> (63 - log),
+        None => 0,
+    }
 }
 
 /// A ring without the corners that lie on the line from the one before to the one after.
@@ -127,4 +173,47 @@ pub(super) fn edges<'a>(contours: impl Iterator<Item = &'a IntContour>) -> Vec<[
         .collect();
     edges.sort_unstable();
     edges
+}
+
+#[cfg(test)]
+mod tests {
+    use i_overlay::core::solver::Strategy;
+
+    use super::*;
+
+    fn contour(corners: &[[i32; 2]]) -> IntContour {
+        let points = corners.iter().map(|&[x, y]| IntPoint::new(x, y));
+        points.collect()
+    }
+
+    #[test]
+    fn long_edges_are_not_cut_among_very_many_others() {
+        let half = 1 << 29;
+        let [diagonal, upright] = [
+            [[-half, -half], [half, half], [-half, half]],
+            [[-half, -half], [half, -half], [half, half]],
+        ]
+        .map(|corners| contour(&corners));
+        let short: Vec<[i32; 2]> = (0..20_000).map(|at| [at, at % 2]).collect();
+        let (coast, few) = (contour(&short), contour(&short[..100]));
+        let strategy = |subject: &IntContour, other: &IntContour| {
+            let [subject, other] = [subject, other].map(std::slice::from_ref);
+            solver(&[subject, other]).strategy
+        };
+        assert_eq!(strategy(&diagonal, &coast), Strategy::List);
+        assert_eq!(strategy(&coast, &diagonal), Strategy::List);
+        assert_eq!(strategy(&diagonal, &few), Strategy::Auto);
+        // The last edge goes back to the first corner.
+        assert_eq!(strategy(&upright, &coast), Strategy::List);
+        assert_eq!(strategy(&coast, &few), Strategy::Auto);
+        let level = contour(&[[-half, 0], [half, 0], [half, 9], [-half, 9]]);
+        assert_eq!(strategy(&level, &coast), Strategy::Auto);
+        // One in the other.
+        let nested = (1..=5000_i32).map(|at| at << 16);
+        let nested: Vec<_> = nested
+            .map(|to| contour(&[[to, 0], [0, to], [-to, 0], [0, -to]]))
+            .collect();
+        assert_eq!(solver(&[&nested, &[]]).strategy, Strategy::List);
+        assert_eq!(solver(&[&nested[..100], &[]]).strategy, Strategy::Auto);
+    }
 }

@@ -64,6 +64,15 @@ mod tests {
         assert!((parts / whole - 1.0).abs() < 1e-8, "{parts} {whole}");
     }
 
+    /// Each edge across the world took some seconds.
+    #[test]
+    fn parts_on_both_sides_of_long_edges_make_the_sea_of_both() {
+        let whole = sea_m2("global");
+        let parts = sea_m2("POLYGON((-180 -90,180 -90,180 90,-180 -90))")
+            + sea_m2("POLYGON((-180 -90,180 90,-180 90,-180 -90))");
+        assert!((parts / whole - 1.0).abs() < 1e-8, "{parts} {whole}");
+    }
+
     #[test]
     fn corners_along_straight_edges_change_nothing() {
         let straight = sea_m2("POLYGON((-90 20,90 20,90 80,-90 80,-90 20))");

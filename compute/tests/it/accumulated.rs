@@ -19,6 +19,7 @@ use storage::contributed::{self, Contributed};
 use crate::fixture::{
     ONE_DEGREE, ask, folder_store, land, months, parts, product, total, wavy_year,
 };
+use crate::quarter_degree::counted;
 
 async fn derive(engine: &Engine, name: &str, start: Option<TimeMs>) -> Manifest {
     derive_accumulated(engine, &product(name), start, &|_progress| ())
@@ -315,6 +316,32 @@ async fn a_budget_of_sums_is_that_of_their_flux_and_says_which_are_complete() {
     };
     let start: TimeMs = "2001-01-11".parse().unwrap();
     assert_eq!(ask(&engine, &early).await.rows[0].start, start);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn days_of_a_budget_of_sums_read_what_its_months_read() {
+    let (_folder, store) = folder_store();
+    let (id, flux) = (product("tiny"), Quantity::CarbonFlux);
+    land(&store, &id, flux, TINY, &tiny_year()).await;
+    let engine = Engine::standalone(store.clone(), parts(2));
+    let derived = derive(&engine, "tiny", None).await;
+    let mut requests = vec![];
+    for (step, rows) in [(TimeStep::Month, 4), (TimeStep::Day, 120)] {
+        let (store, counting) = counted(&store, "contributed/");
+        let engine = Engine::standalone(store, parts(2));
+        let question = BudgetQuery {
+            step,
+            ..total(&derived.product, "global")
+        };
+        let answer = ask(&engine, &question).await;
+        assert_eq!(answer.rows.len(), rows);
+        assert!(answer.rows.iter().all(|row| row.completeness.is_some()));
+        requests.push(counting.requests());
+    }
+    assert!(
+        requests[0] > 0 && requests[0] == requests[1],
+        "{requests:?}"
+    );
 }
 
 #[tokio::test(flavor = "multi_thread")]

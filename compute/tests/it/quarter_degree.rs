@@ -60,7 +60,7 @@ fn noise(
 }
 
 /// The store with its requests for objects of a folder counted.
-fn counted(store: &Store, folder: &'static str) -> (Store, Arc<Counting>) {
+pub(crate) fn counted(store: &Store, folder: &'static str) -> (Store, Arc<Counting>) {
     let made = Mutex::new(vec![]);
     let counted = store.through(|objects| {
         let counting = Arc::new(Counting::under(objects, folder));

@@ -1,6 +1,7 @@
 //! A reference in, the values that it refers to out: the way of the landing, from the plan that the attachment keeps.
 
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 use async_trait::async_trait;
 use contract::masked::MaskedCells;
@@ -21,6 +22,9 @@ use crate::plan::cf::unmarked::Ends;
 
 /// Stores of others that are kept open: each may hold a hundred megabytes of chunks.
 const KEPT_STORES: usize = 4;
+/// How long what was read of a store is taken for what it holds, whatever is found: one that has changed, and was not attached anew, is
+/// not opened more often.
+const JUST_READ: Duration = Duration::from_secs(1);
 
 /// What tells arrays of stores apart.
 type Name = (String, StoreKind, Option<String>, String);
@@ -28,7 +32,8 @@ type Name = (String, StoreKind, Option<String>, String);
 /// Reads fields of attached products from where they lie, with the credentials of this process' environment.
 #[derive(Debug)]
 pub struct ForeignFields {
-    open: Cache<Name, Arc<Foreign>>,
+    /// With when each was opened.
+    open: Cache<Name, (Arc<Foreign>, Instant)>,
 }
 
 impl Default for ForeignFields {
@@ -37,6 +42,17 @@ impl Default for ForeignFields {
             open: Cache::new(KEPT_STORES),
         }
     }
+}
+
+fn name(attachment: &Attachment) -> Name {
+    let Attachment {
+        store,
+        kind,
+        snapshot,
+        array,
+        ..
+    } = attachment;
+    (store.clone(), *kind, snapshot.clone(), array.clone())
 }
 
 impl ForeignFields {
@@ -48,16 +64,18 @@ impl ForeignFields {
             array,
             ..
         } = attachment;
-        let name = (store.clone(), *kind, snapshot.clone(), array.clone());
         let open = async {
+            let now = Instant::now();
             let found = Found {
                 kind: *kind,
                 snapshot: snapshot.clone(),
             };
             let opened = Foreign::open_one(address::open(store)?, found, array).await?;
-            Ok(Arc::new(opened))
+            Ok((Arc::new(opened), now))
         };
-        self.open.get_or_insert_async(&name, open).await
+        let name = name(attachment);
+        let opened = self.open.get_or_insert_async(&name, open).await;
+        opened.map(|(foreign, _since)| foreign)
     }
 }
 
@@ -110,6 +128,13 @@ impl Source for ForeignFields {
     async fn gone(&self, attachment: &Attachment, reference: &Reference) -> Option<Failure> {
         let gone = moved::gone(attachment).await?;
         Some(of_step(gone, attachment, reference.period))
+    }
+
+    fn let_go(&self, attachment: &Attachment) -> bool {
+        let name = name(attachment);
+        let opened = self.open.get(&name);
+        let is_old = opened.is_some_and(|(_foreign, since)| since.elapsed() > JUST_READ);
+        is_old && self.open.remove(&name).is_some()
     }
 }
 

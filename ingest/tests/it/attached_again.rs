@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 use contract::grid::Grid;
 use contract::kind::Vouched;
@@ -25,6 +26,9 @@ const GRID: Grid = Grid {
     dlat_deg: 1.0,
     dlon_deg: 1.0,
 };
+
+/// Longer than anything here takes, also on a busy machine.
+const LIMIT: Duration = Duration::from_secs(30);
 
 async fn again(own: &Own) -> Result<Attached, String> {
     let product = "sst".parse().unwrap();
@@ -433,4 +437,40 @@ async fn a_valid_range_in_json_is_of_stored_numbers_unless_it_has_a_fraction() {
             &highest.to_string(),
         );
     }
+}
+
+#[tokio::test]
+async fn who_has_read_a_store_before_it_is_attached_anew_reads_what_is_there_now() {
+    let own = Own::with(PLAIN);
+    own.attach().await.unwrap();
+    let before = own.newest().await;
+    // A server keeps the store open, and what it has read of it.
+    let server = readable(&own.store.bare());
+    for step in &before.steps {
+        let read = fields::read(&server, &step.field, &before.grid).await;
+        read.unwrap();
+    }
+    let chunk = own.path().join("sst/1.0.0");
+    let mut values = std::fs::read(&chunk).unwrap();
+    for number in values.chunks_exact_mut(4) {
+        let value = f32::from_le_bytes((&*number).try_into().unwrap());
+        number.copy_from_slice(&(value + 0.5).to_le_bytes());
+    }
+    std::fs::write(&chunk, values).unwrap();
+    again(&own).await.unwrap();
+    let newest = own.newest().await;
+    let field = &newest.steps[1].field;
+    assert_ne!(*field, before.steps[1].field, "it has other values");
+    // For a moment it takes what it has just read for what is there.
+    let begun = Instant::now();
+    let read = loop {
+        match fields::read(&server, field, &newest.grid).await {
+            Ok(values) => break values,
+            Err(error) => assert!(begun.elapsed() < LIMIT, "{error}"),
+        }
+        tokio::time::sleep(Duration::from_millis(50)).await;
+    };
+    let anew = readable(&own.store.bare());
+    let there = fields::read(&anew, field, &newest.grid).await.unwrap();
+    assert_same(&read, &there, "what is there now");
 }

@@ -145,20 +145,21 @@ impl Layer {
 
     async fn read(&self, place: &Place, reference: Reference) -> Result<Bytes> {
         let attachment = self.attachment(place, reference.attachment).await?;
-        let values = self.held.source.values(&attachment, &reference).await;
-        let values = values.map_err(failed)?;
-        let (digest, grid) = (place.digest, shape_only(reference.rows, reference.cols));
-        let period = reference.period;
-        let encoded = off_thread(move || {
-            if values.len() != grid.cell_count() {
-                return Ok(None);
-            }
-            let encoded = fields::encode(&grid, &values, period)?;
-            Ok((encoded.values_sha256 == digest).then_some(encoded.content))
-        });
-        if let Some(content) = encoded.await.map_err(|e| failed(Box::new(e)))? {
+        let source = &self.held.source;
+        let values = source.values(&attachment, &reference).await;
+        let mut found = encoded(values, &reference, place.digest).await?;
+        let may_be_old = match &found {
+            Ok(content) => content.is_none(),
+            Err(failure) => failure.cause == Cause::Content,
+        };
+        if may_be_old && source.let_go(&attachment) {
+            let values = source.values(&attachment, &reference).await;
+            found = encoded(values, &reference, place.digest).await?;
+        }
+        if let Some(content) = found.map_err(failed)? {
             return Ok(content);
         }
+        let period = reference.period;
         // Where a store is gone, each of its chunks is not there, which may mean no data.
         let gone = self.held.source.gone(&attachment, &reference).await;
         let changed = || Failure {
@@ -213,6 +214,28 @@ impl Layer {
         meta.size = content.len() as u64;
         Ok(Some((meta, content)))
     }
+}
+
+/// The bytes of the field of some values; none if they are others than those of its name.
+async fn encoded(
+    values: std::result::Result<Vec<f32>, Failure>,
+    reference: &Reference,
+    digest: Digest,
+) -> Result<std::result::Result<Option<Bytes>, Failure>> {
+    let values = match values {
+        Ok(values) => values,
+        Err(failure) => return Ok(Err(failure)),
+    };
+    let grid = shape_only(reference.rows, reference.cols);
+    let period = reference.period;
+    let encoded = off_thread(move || {
+        if values.len() != grid.cell_count() {
+            return Ok(None);
+        }
+        let encoded = fields::encode(&grid, &values, period)?;
+        Ok((encoded.values_sha256 == digest).then_some(encoded.content))
+    });
+    encoded.await.map(Ok).map_err(|e| failed(Box::new(e)))
 }
 
 /// The part of a field that is asked for.

@@ -23,4 +23,10 @@ pub trait Source: std::fmt::Debug + Send + Sync {
     async fn gone(&self, _attachment: &Attachment, _reference: &Reference) -> Option<Failure> {
         None
     }
+
+    /// Lets go of what is kept of the store of an attachment, which may be of before it changed and was attached anew. False where nothing
+    /// is kept, or what is has just been read.
+    fn let_go(&self, _attachment: &Attachment) -> bool {
+        false
+    }
 }

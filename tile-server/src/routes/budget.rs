@@ -265,7 +265,9 @@ async fn answered(
     read: Read,
 ) -> Result<Response, ServerError> {
     let form = form(asked.format.as_deref(), headers)?;
-    let as_of: Option<AsOf> = parsed(asked.as_of.as_deref())?;
+    // A plus sign of an offset is a space to a query, as in other times.
+    let as_of = asked.as_of.as_deref().map(|text| text.replace(' ', "+"));
+    let as_of: Option<AsOf> = parsed(as_of.as_deref())?;
     let layer = match (&as_of, asked.manifest.as_deref()) {
         (Some(_), Some(_)) => {
             return Err(ServerError::Address {

@@ -174,7 +174,7 @@ impl Head {
     }
 }
 
-/// Does `If-None-Match` name the tag? Weak comparison, as RFC 9110, 13.1.2 asks for.
+/// Does `If-None-Match` name the tag, or any? Weak comparison, as RFC 9110, 13.1.2 asks for.
 pub(crate) fn has_tag(asked: &HeaderMap, tag: &str) -> bool {
     let tag = tag.trim_start_matches("W/");
     let lists = asked
@@ -183,5 +183,6 @@ pub(crate) fn has_tag(asked: &HeaderMap, tag: &str) -> bool {
         .filter_map(|value| value.to_str().ok());
     lists
         .flat_map(|list| list.split(','))
-        .any(|one| one.trim().trim_start_matches("W/") == tag)
+        .map(str::trim)
+        .any(|one| one == "*" || one.trim_start_matches("W/") == tag)
 }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use axum::body::Body;
 use axum::extract::State;
-use axum::http::{HeaderMap, StatusCode, header};
+use axum::http::{HeaderMap, Method, StatusCode, header};
 use axum::response::{IntoResponse as _, Response};
 use cube::Keys;
 
@@ -39,6 +39,7 @@ use crate::state::AppState;
 )]
 pub(crate) async fn get(
     State(state): State<AppState>,
+    method: Method,
     UrlPath((product, key)): UrlPath<(String, String)>,
     asked: HeaderMap,
 ) -> Result<Response, ServerError> {
@@ -63,7 +64,8 @@ pub(crate) async fn get(
     if has_tag(&asked, &tag) {
         return Ok((StatusCode::NOT_MODIFIED, headers).into_response());
     }
-    let range = if is_of_same(&asked, &tag) {
+    // To HEAD a range means nothing (RFC 9110, 14.2): it asks for what GET says of all.
+    let range = if method == Method::GET && is_of_same(&asked, &tag) {
         part(&asked, length)?
     } else {
         None

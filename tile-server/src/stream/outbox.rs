@@ -73,4 +73,6 @@ async fn write(
             }
         }
     }
+    // Who closes is answered so (RFC 6455, 5.5.1), and who breaks the protocol is told that it ends.
+    drop(tokio::time::timeout(LIMIT, sink.close()).await);
 }

@@ -199,6 +199,13 @@ impl Session {
                     "a message has at most 8 KiB",
                 ));
             }
+            Some(Err(error)) if is_no_text(&error) => {
+                return Err(End::told(
+                    "refused",
+                    close_code::INVALID,
+                    "messages are text of UTF-8",
+                ));
+            }
             Some(Err(_)) | None => return Err(End::gone()),
         };
         self.heard = Instant::now();
@@ -414,4 +421,8 @@ async fn now<T>(under_way: Option<&mut BoxFuture<'static, T>>) -> T {
 
 fn is_too_long(error: &axum::Error) -> bool {
     error.to_string().contains("too long")
+}
+
+fn is_no_text(error: &axum::Error) -> bool {
+    error.to_string().contains("UTF-8")
 }

@@ -151,6 +151,11 @@ async fn what_is_asked_besides_and_makes_no_sense_is_refused() {
         ),
         ("?error=nothing&correlation_length_km=7", 404, "no product"),
         ("?as_of=1970", 400, "the first version of flux"),
+        (
+            "?as_of=1970-01-01T00:00:00+02:00",
+            400,
+            "the first version of flux",
+        ),
         ("?as_of=x", 400, "an instant"),
         ("/history?as_of=2000", 400, "all versions"),
         ("?regions=A+B", 400, "a mask"),

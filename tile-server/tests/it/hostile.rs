@@ -254,6 +254,33 @@ async fn nothing_can_be_written() {
 }
 
 #[tokio::test]
+async fn who_takes_an_answer_in_no_form_is_told_so_and_is_sent_nothing_else() {
+    let app = TestApp::new().await;
+    for path in [
+        "/api/products",
+        "/api/products/nothing/point?lon=0&lat=0",
+        "/tiles/flux/map/0/0/0.png",
+        "/zarr/flux@1/zarr.json",
+        "/healthz",
+    ] {
+        for coding in ["identity;q=0", "*;q=0", "br, identity;q=0"] {
+            let answer = app.get_with(path, &[("accept-encoding", coding)]).await;
+            assert_eq!(answer.status, StatusCode::NOT_ACCEPTABLE, "{path} {coding}");
+            assert!(answer.reason().contains("Accept-Encoding"), "{path}");
+            assert_eq!(
+                (answer.header("cache-control"), answer.header("vary")),
+                ("no-store", "accept-encoding"),
+                "{path}"
+            );
+            assert_eq!(answer.header("etag"), "", "{path}");
+            assert_eq!(answer.header("access-control-allow-origin"), "*", "{path}");
+        }
+        let answer = app.get_with(path, &[("accept-encoding", "br")]).await;
+        assert_ne!(answer.status, StatusCode::NOT_ACCEPTABLE, "{path}");
+    }
+}
+
+#[tokio::test]
 async fn head_is_get_without_a_body() {
     let app = TestApp::new().await;
     let request = Request::builder()

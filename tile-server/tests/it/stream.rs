@@ -14,6 +14,9 @@ use tile_server::{Server, Settings};
 use tokio::net::TcpStream;
 use tokio::sync::oneshot;
 use tokio::task::JoinHandle;
+use tokio_tungstenite::tungstenite::protocol::CloseFrame;
+use tokio_tungstenite::tungstenite::protocol::frame::Frame;
+use tokio_tungstenite::tungstenite::protocol::frame::coding::{CloseCode, Data, OpCode};
 use tokio_tungstenite::tungstenite::{Error, Message};
 use tokio_tungstenite::{MaybeTlsStream, WebSocketStream, connect_async};
 
@@ -305,15 +308,31 @@ async fn a_wrong_address_is_answered_and_the_stream_goes_on() {
 }
 
 #[tokio::test]
+async fn who_closes_is_answered_in_kind() {
+    let running = Running::new(|_usual| {}).await;
+    let mut camera = running.connect().await;
+    camera.look(1, VIEW).await;
+    camera.full().await;
+    let why = CloseFrame {
+        code: CloseCode::Normal,
+        reason: "seen enough".into(),
+    };
+    camera.socket.close(Some(why)).await.unwrap();
+    assert_eq!(camera.closed().await.0, 1000);
+}
+
+#[tokio::test]
 async fn who_breaks_the_rules_is_told_why_and_others_are_served() {
     let running = Running::new(|_usual| {}).await;
     let mut good = running.connect().await;
     let long = format!(r#"{{"id": 1, "view": "{}"}}"#, "x".repeat(9000));
+    let no_text = Frame::message(vec![0xFF, 0xFE], OpCode::Data(Data::Text), true);
     for (message, code, word) in [
         (Message::text("look left"), 1007, "neither"),
         (Message::text(r#"{"id": 1}"#), 1007, "neither"),
         (Message::binary(vec![0; 10]), 1003, "text"),
         (Message::text(long), 1009, "8 KiB"),
+        (Message::Frame(no_text), 1007, "UTF-8"),
     ] {
         let mut bad = running.connect().await;
         bad.socket.send(message).await.unwrap();

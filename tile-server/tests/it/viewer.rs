@@ -122,6 +122,13 @@ async fn text_is_compressed_and_pictures_are_not() {
     assert_eq!(products.header("content-encoding"), "gzip");
     let plain = app.get("/api/products").await;
     assert!(products.body.len() < plain.body.len() / 2);
+    // A copy that is right was compressed or not as well, which caches on the way are told.
+    let tag = [("if-none-match", products.header("etag"))];
+    let again = app.get_with("/api/products", &tag).await;
+    assert_eq!(again.status, StatusCode::NOT_MODIFIED);
+    for answer in [&products, &plain, &again] {
+        assert_eq!(answer.header("vary"), "accept-encoding");
+    }
     assert_eq!(
         app.get_with("/tiles/flux/map/0/0/0.png", &asked)
             .await

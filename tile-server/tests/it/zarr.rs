@@ -72,6 +72,13 @@ async fn what_there_is_not_is_not_found() {
         ("flux/carbon_flux/c/x/0/0", "nothing at this address"),
         ("flux/../repo", "nothing at this address"),
         ("flux/carbon_flux", "nothing at this address"),
+        ("flux/c", "nothing at this address"),
+        ("flux/c/0/0/0", "nothing at this address"),
+        ("flux/c/c/c/0", "nothing at this address"),
+        ("flux/timec/0", "nothing at this address"),
+        ("flux//zarr.json", "nothing at this address"),
+        ("flux/time/c/+0", "nothing at this address"),
+        ("flux/time/c/00", "nothing at this address"),
         ("nothing/zarr.json", "no product"),
         ("flux@99/zarr.json", "no version"),
         ("flux@x/zarr.json", "no version"),
@@ -116,6 +123,16 @@ async fn parts_are_those_of_the_whole_and_copies_are_known_again() {
         (again.status, again.body.len()),
         (StatusCode::NOT_MODIFIED, 0)
     );
+    let any = app.get_with(path, &[("if-none-match", "*")]).await;
+    assert_eq!(any.status, StatusCode::NOT_MODIFIED);
+    // HEAD is told of all of it, whatever part it asks for.
+    let head = Request::head(path).header(header::RANGE, "bytes=0-9");
+    let head = app.send(head.body(Body::empty()).unwrap()).await;
+    assert_eq!(
+        (head.status, head.header("content-length")),
+        (StatusCode::OK, length.to_string().as_str())
+    );
+    assert_eq!(head.header("content-range"), "");
     // Who has a part of it wants the rest, or all of what came since.
     for (tag, status) in [
         (tag, StatusCode::PARTIAL_CONTENT),
