@@ -144,7 +144,7 @@ fn changes(name: &str) -> bool {
 }
 
 /// Is this the name of a part of the empty state that each repository begins with?
-fn is_initial(name: &str) -> bool {
+pub(crate) fn is_initial(name: &str) -> bool {
     name.ends_with(&Snapshot::INITIAL_SNAPSHOT_ID.to_string())
 }
 
