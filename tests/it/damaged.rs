@@ -180,7 +180,7 @@ fn what_was_computed_is_made_again_of_what_it_is_made_of_and_carbon_of_its_flux(
         "2 * flux",
     ];
     program::succeed(data, &derive).unwrap();
-    let mend = |product| {
+    let mend = |product: &'static str| {
         [
             "recompute",
             "--product",
@@ -190,7 +190,7 @@ fn what_was_computed_is_made_again_of_what_it_is_made_of_and_carbon_of_its_flux(
             "frames",
         ]
     };
-    let fields = |product| files(&data.join("objects/frames").join(product));
+    let fields = |product: &str| files(&data.join("objects/frames").join(product));
     flip(&fields("twice")[0]);
     assert_eq!(named(data).len(), 1);
     program::succeed(data, &mend("twice")).unwrap();
