@@ -2,7 +2,7 @@
 //!
 //! Every step is computed and stored by an executor, which reads the fields of the inputs and answers with names; then runs
 //! of steps are stored time-major in the same way. A step is named by the computation and the content of what it is made of:
-//! those of the newest version that still are what they would be are kept.
+//! those of the newest version that still are what they would be, and that are there, are kept.
 
 pub mod co2_flux;
 mod fits;
@@ -14,16 +14,17 @@ mod read;
 mod request;
 mod work;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use contract::computed::{Computation, Computed, ComputedInput};
 use contract::digest::Digest;
+use contract::key::ObjectKey;
 use contract::manifest::{MANIFEST_SCHEMA, Manifest, Step};
 use contract::masked::MaskedCells;
 use contract::quantity::Quantity;
 use futures::future::BoxFuture;
 use storage::domain::Cells;
-use storage::{domain, manifests};
+use storage::{domain, manifests, verify};
 
 use crate::functions::{COMPUTED_EXTENT, COMPUTED_FIELD};
 use crate::publish::{IsStillAsked, MADE_AGAIN, check_asked, publish_if};
@@ -96,8 +97,12 @@ pub(crate) fn compute_if<'a>(
             let inputs = plan.inputs.iter().map(|input| &input.manifest);
             lineage::check(engine.store(), &request.target, inputs).await?;
         }
-        let kept = kept(&plan, latest.as_ref());
-        if let Some(latest) = latest.filter(|it| plan.is_what_is_there(request, it, &kept)) {
+        let there = verify::own_there(engine.store(), &request.target).await?;
+        let kept = kept(&plan, latest.as_ref(), &there);
+        let is_there = |latest: &Manifest| {
+            there.contains(&latest.domain) && plan.is_what_is_there(request, latest, &kept)
+        };
+        if let Some(latest) = latest.filter(is_there) {
             cube::keep_up(engine.store(), &latest).await;
             return Ok(Outcome {
                 kept_count: latest.steps.len(),
@@ -272,11 +277,7 @@ impl Plan {
     }
 
     /// The cells that hold data in some of the steps.
-    async fn extent(
-        &self,
-        engine: &Engine,
-        steps: &[Step],
-    ) -> Result<contract::key::ObjectKey, ComputeError> {
+    async fn extent(&self, engine: &Engine, steps: &[Step]) -> Result<ObjectKey, ComputeError> {
         let per_run = (RUN_VALUES / self.job.target_grid.cell_count()).max(LEAST_RUN);
         let task = |(index, run): (usize, &[Step])| ExtentTask {
             first: index * per_run,
@@ -297,12 +298,7 @@ impl Plan {
         Ok(domain::write_cells(engine.store(), &self.job.target, cells).await?)
     }
 
-    fn manifest(
-        self,
-        request: &Request,
-        steps: Vec<Step>,
-        domain: contract::key::ObjectKey,
-    ) -> Manifest {
+    fn manifest(self, request: &Request, steps: Vec<Step>, domain: ObjectKey) -> Manifest {
         let computed = self.computed(request);
         Manifest {
             schema: MANIFEST_SCHEMA,
@@ -356,20 +352,25 @@ fn named_unit(input: &Input) -> (String, String) {
     )
 }
 
-/// Steps of the newest version that are what they would be.
-fn kept(plan: &Plan, latest: Option<&Manifest>) -> BTreeMap<usize, Step> {
+/// Steps of the newest version that are what they would be, and whose fields are there.
+fn kept(
+    plan: &Plan,
+    latest: Option<&Manifest>,
+    there: &BTreeSet<ObjectKey>,
+) -> BTreeMap<usize, Step> {
     let is_of_kind = |latest: &&Manifest| latest.quantity.is_same_kind(plan.job.quantity);
     let Some(latest) = latest.filter(is_of_kind) else {
         return BTreeMap::new();
     };
-    let there: BTreeMap<Digest, &Step> = latest
+    let of_now: BTreeMap<Digest, &Step> = latest
         .steps
         .iter()
+        .filter(|step| there.contains(&step.field))
         .map(|step| (step.raw_sha256, step))
         .collect();
     let kept = |(index, step): (usize, &Matched)| {
-        let there = there.get(&matched::made_of(plan.computation, step))?;
-        Some((index, (*there).clone()))
+        let kept = of_now.get(&matched::made_of(plan.computation, step))?;
+        Some((index, (*kept).clone()))
     };
     plan.matches
         .steps

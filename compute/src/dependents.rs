@@ -5,6 +5,7 @@
 //! as it is.
 
 mod behind;
+mod mend;
 mod order;
 mod recipe;
 
@@ -23,6 +24,7 @@ use crate::publish::{IsStillAsked, MADE_AGAIN};
 use crate::summed::has_budget;
 use crate::{ComputeError, Engine, catalogue};
 pub use behind::behind;
+pub use mend::mend;
 use order::Order;
 use recipe::Recipe;
 pub use recipe::why_it_stays;

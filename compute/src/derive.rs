@@ -13,12 +13,12 @@ mod with_data;
 
 use contract::digest::Digest;
 use contract::event::Body;
-use contract::manifest::{Manifest, ManifestId};
+use contract::manifest::{Manifest, ManifestId, Step};
 use contract::product::ProductId;
 use contract::quantity::Quantity;
 use contract::time::{Period, TimeMs};
 use futures::future::BoxFuture;
-use storage::{Store, manifests};
+use storage::{Store, manifests, verify};
 
 use crate::publish::{IsStillAsked, MADE_AGAIN, check_asked, publish_if};
 use crate::summed::check_summed;
@@ -95,6 +95,10 @@ pub(crate) fn derive_accumulated_if<'a>(
         let target = product.accumulated()?;
         let latest = manifests::latest(engine.store(), &target).await?;
         check_asked((&target, latest.as_ref()), is_still_asked)?;
+        let latest = match latest {
+            Some(latest) => what_is_there(engine.store(), latest).await?,
+            None => None,
+        };
         let asked = Asked::of(start, &steps);
         if let Some(latest) = latest
             .as_ref()
@@ -108,6 +112,25 @@ pub(crate) fn derive_accumulated_if<'a>(
         let of = (&source, asked);
         derive(engine, of, latest.as_ref(), is_still_asked, progress).await
     })
+}
+
+/// A version up to the first step whose field or counts are gone; none of one without its domain.
+async fn what_is_there(
+    store: &Store,
+    mut latest: Manifest,
+) -> Result<Option<Manifest>, ComputeError> {
+    let there = verify::own_there(store, &latest.product).await?;
+    let is_there = |step: &Step| {
+        let counts = step.contributed.as_ref().map(|of| &of.counts);
+        there.contains(&step.field) && counts.is_none_or(|counts| there.contains(counts))
+    };
+    let count = latest
+        .steps
+        .iter()
+        .take_while(|step| is_there(step))
+        .count();
+    latest.steps.truncate(count);
+    Ok(there.contains(&latest.domain).then_some(latest))
 }
 
 /// [`derive_accumulated`] with every step that ends after `from` computed anew, whatever is stored. If what comes out is what is

@@ -102,7 +102,7 @@ pub(crate) async fn caught<T>(
     }
 }
 
-/// An answer of the engine that read some objects; where it failed or did not fit because one of them is damaged, the
+/// An answer of the engine that read some objects; where it failed or did not fit because one of them is damaged or gone, the
 /// error that names it.
 ///
 /// The engine sees rows and pages, not objects: which one it was is found by reading each of them whole.
@@ -116,11 +116,12 @@ pub(crate) async fn or_damaged<T>(
         other => return other,
     };
     for key in keys {
-        // Of other errors what failed first is told.
-        if let Err(damaged @ StorageError::Damaged { .. }) =
-            storage::verify::sound(store, key).await
-        {
-            return Err(damaged.into());
+        match storage::verify::sound(store, key).await {
+            Err(damaged @ StorageError::Damaged { .. }) => return Err(damaged.into()),
+            // The engine passes over what is not there, and answers with fewer rows.
+            Err(gone) if gone.is_not_found() => return Err(gone.into()),
+            // Of other errors what failed first is told.
+            Ok(()) | Err(_) => {}
         }
     }
     Err(error)

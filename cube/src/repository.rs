@@ -10,6 +10,7 @@ use icechunk::config::{
 };
 use icechunk::format::SnapshotId;
 use icechunk::format::format_constants::SpecVersionBin;
+use icechunk::format::snapshot::Snapshot;
 use icechunk::refs::RefErrorKind;
 use icechunk::repository::{RepositoryError, RepositoryErrorKind, VersionInfo};
 use storage::Store;
@@ -141,7 +142,7 @@ impl Repository {
     /// Opens the repository in a folder of a store.
     ///
     /// # Errors
-    /// `Missing` if there is none, `Foreign` if it is not of a product.
+    /// `Missing` if there is none, or nothing was committed to it yet; `Foreign` if it is not of a product.
     pub fn open<'a>(store: &'a Store, folder: &'a str) -> BoxFuture<'a, Result<Self, CubeError>> {
         Box::pin(async move {
             let inner = Self::open_inner(store, folder, None).await?;
@@ -150,6 +151,10 @@ impl Repository {
             let session = inner.readonly_session(&version).await;
             let session =
                 session.map_err(|e| CubeError::library(&place, "reading the newest state", e))?;
+            // Somebody is making it, or was killed over that.
+            if *session.snapshot_id() == Snapshot::INITIAL_SNAPSHOT_ID {
+                return Err(CubeError::Missing { place });
+            }
             let arrays = Arc::new(AsyncIcechunkStore::new(session));
             let description = Description::of_group(&arrays, &place).await?;
             Ok(Self {

@@ -7,15 +7,16 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use contract::key::ObjectKey;
 use contract::kind::Kind;
-use contract::manifest::Manifest;
+use contract::manifest::{Manifest, ManifestId};
 use contract::product::ProductId;
 use futures::TryStreamExt as _;
 use futures::future::BoxFuture;
 use icechunk::format::manifest::ChunkPayload;
 use storage::verify::{Fault, Finding};
-use storage::{Store, manifests};
+use storage::{StorageError, Store, manifests};
 
 use crate::follow::folder;
+use crate::object_storage::is_initial;
 use crate::{At, Cube, CubeError, Repository, Step, compact, complete, series};
 
 /// What a cube was found to be.
@@ -66,6 +67,13 @@ pub fn check<'a>(
         let mut checked = Checked::default();
         match check.versions(product, &mut checked).await {
             Ok(()) => {}
+            // Fields are read until it is there.
+            Err(CubeError::Missing { .. }) if check.is_unbegun() => {
+                check.behind(None, product, &mut checked).await?;
+            }
+            // What the newest version is cannot be read, and is told of already.
+            Err(CubeError::Storage(StorageError::Damaged { object, .. }))
+                if damaged.iter().any(|key| *key.as_str() == *object) => {}
             // It says nothing of the cube.
             Err(error) if error.is_retryable() => return Err(error),
             // What it needs is damaged, and told of already.
@@ -134,10 +142,23 @@ impl Check<'_> {
                 self.version(&cube, &shown, &mut seen, checked).await?;
             }
         }
-        let (own, latest) = (
-            newest.description().version.as_ref(),
-            manifests::latest(self.store, product).await?,
-        );
+        self.behind(newest.description().version.as_ref(), product, checked)
+            .await
+    }
+
+    /// Is nothing there but what making a repository begins with? Then nothing was ever committed to it.
+    fn is_unbegun(&self) -> bool {
+        self.there.contains(&self.entry) || self.there.iter().all(|key| is_initial(key.as_str()))
+    }
+
+    /// Notes where its newest state is not of the newest version of the product.
+    async fn behind(
+        &self,
+        own: Option<&ManifestId>,
+        product: &ProductId,
+        checked: &mut Checked,
+    ) -> Result<(), CubeError> {
+        let latest = manifests::latest(self.store, product).await?;
         if let Some(latest) = latest.map(|latest| latest.id())
             && own != Some(&latest)
         {

@@ -176,6 +176,16 @@ pub(crate) async fn single_desk(settings: &Settings, store: Store) -> Result<Des
     desk(settings, store, limits, &Registry::new()).await
 }
 
+/// Where products are looked for, for people: the data folder, unless another store is named.
+fn place(url: &str, data: &Path) -> String {
+    let own = data.join("objects").display().to_string();
+    if url.trim_end_matches('/').ends_with(&own) {
+        data.display().to_string()
+    } else {
+        url.to_owned()
+    }
+}
+
 /// The newest manifest of a product, or an error that names the products there are.
 pub(crate) async fn manifest(store: &Store, product: &ProductId, data: &Path) -> Result<Manifest> {
     if let Some(manifest) = storage::manifests::latest(store, product).await? {
@@ -186,7 +196,7 @@ pub(crate) async fn manifest(store: &Store, product: &ProductId, data: &Path) ->
     if known.is_empty() {
         bail!(
             "{} holds no product yet; land files with `fluxglobe ingest` or run `fluxglobe demo`",
-            data.display()
+            place(store.url(), data)
         );
     }
     bail!(
@@ -236,5 +246,29 @@ mod tests {
         assert!(of("flux-accumulated").contains("derive accumulated --product flux`"));
         assert_eq!(of("flx-accumulated"), "");
         assert_eq!(of("flx"), "");
+    }
+
+    #[tokio::test]
+    async fn what_holds_no_product_is_where_products_are_looked_for() {
+        let folder = tempfile::tempdir().unwrap();
+        let data = folder.path().join("data");
+        let told = async |store: &Store| {
+            let found = manifest(store, &"sst".parse().unwrap(), &data).await;
+            found.unwrap_err().to_string()
+        };
+        let own = Store::open(data.join("objects").to_str().unwrap()).unwrap();
+        let text = told(&own).await;
+        let place = data.display();
+        assert!(
+            text.starts_with(&format!("{place} holds no product")),
+            "{text}"
+        );
+        let other = Store::open(folder.path().to_str().unwrap()).unwrap();
+        let text = told(&other).await;
+        let place = other.url();
+        assert!(
+            text.starts_with(&format!("{place} holds no product")),
+            "{text}"
+        );
     }
 }

@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 
 use contract::key::ObjectKey;
 use contract::kind::Kind;
+use contract::manifest::Manifest;
 use contract::product::ProductId;
 use futures::{StreamExt as _, TryStreamExt as _, stream};
 use serde::Serialize;
@@ -152,6 +153,80 @@ pub async fn damaged(
         .try_collect()
         .await?;
     Ok(found.into_iter().flatten().collect())
+}
+
+/// What a version has of its own: its domain, its fields, and counts of what contributed to them.
+pub fn own_of(manifest: &Manifest) -> impl Iterator<Item = &ObjectKey> {
+    let of_steps = manifest.steps.iter().flat_map(|step| {
+        let counts = step.contributed.as_ref().map(|of| &of.counts);
+        std::iter::once(&step.field).chain(counts)
+    });
+    std::iter::once(&manifest.domain).chain(of_steps)
+}
+
+/// What is there of that of all versions of a product, whole or damaged.
+pub async fn own_there(
+    store: &Store,
+    product: &ProductId,
+) -> Result<BTreeSet<ObjectKey>, StorageError> {
+    let mut there = BTreeSet::new();
+    for kind in [Kind::Domain, Kind::Field, Kind::Contributed] {
+        there.extend(store.list(&format!("{}/{product}", kind.folder())).await?);
+    }
+    Ok(there)
+}
+
+/// Is all of that there, whole or damaged, of a version?
+pub async fn has_own(store: &Store, manifest: &Manifest) -> Result<bool, StorageError> {
+    let there = own_there(store, &manifest.product).await?;
+    Ok(own_of(manifest).all(|own| there.contains(own)))
+}
+
+/// What of that is damaged or gone.
+pub async fn broken(
+    store: &Store,
+    manifest: &Manifest,
+) -> Result<BTreeSet<ObjectKey>, StorageError> {
+    broken_of(
+        store,
+        &manifest.product,
+        own_of(manifest).cloned().collect(),
+    )
+    .await
+}
+
+/// What of that is damaged or gone of versions before the newest one, and that one does not share.
+pub async fn broken_before(
+    store: &Store,
+    product: &ProductId,
+) -> Result<BTreeSet<ObjectKey>, StorageError> {
+    let mut numbers = manifests::numbers(store, product).await?;
+    let Some(newest) = numbers.pop() else {
+        return Ok(BTreeSet::new());
+    };
+    let mut own = BTreeSet::new();
+    for number in numbers {
+        let manifest = manifests::numbered(store, product, number).await?;
+        own.extend(manifest.iter().flat_map(own_of).cloned());
+    }
+    if let Some(newest) = manifests::numbered(store, product, newest).await? {
+        for shared in own_of(&newest) {
+            own.remove(shared);
+        }
+    }
+    broken_of(store, product, own).await
+}
+
+async fn broken_of(
+    store: &Store,
+    product: &ProductId,
+    own: BTreeSet<ObjectKey>,
+) -> Result<BTreeSet<ObjectKey>, StorageError> {
+    let there = own_there(store, product).await?;
+    let (there, mut broken): (BTreeSet<_>, BTreeSet<_>) =
+        own.into_iter().partition(|own| there.contains(own));
+    broken.extend(damaged(store, there).await?);
+    Ok(broken)
 }
 
 async fn if_damaged(store: Store, key: ObjectKey) -> Result<Option<ObjectKey>, StorageError> {

@@ -71,6 +71,20 @@ fn a_flipped_bit_of_any_object_or_of_the_journal_is_named_by_verify() {
     assert_eq!(named(data), [""; 0]);
 }
 
+#[test]
+fn a_damaged_newest_version_is_named_and_so_is_what_else_is_damaged() {
+    let data = data();
+    let data = data.path();
+    let mut keys = vec![];
+    for folder in ["manifests/fgco2", "raw/fgco2"] {
+        let path = files(&data.join("objects").join(folder)).pop().unwrap();
+        flip(&path);
+        let key = path.strip_prefix(data.join("objects")).unwrap();
+        keys.push(key.to_str().unwrap().to_owned());
+    }
+    assert_eq!(named(data), keys);
+}
+
 /// Of each part of a cube, chunks among them, one: an array's chunk is told by its place in it.
 #[test]
 fn a_flipped_bit_of_a_cube_is_named_with_product_array_and_chunk() {
@@ -147,6 +161,48 @@ fn what_is_no_flux_is_made_again_as_verify_advises() {
         .unwrap();
         assert!(refused.contains("budget"), "{refused}");
     }
+}
+
+/// What was computed has no files that it could be read from again.
+#[test]
+fn what_was_computed_is_made_again_of_what_it_is_made_of_and_carbon_of_its_flux() {
+    let data = data();
+    let data = data.path();
+    let derive = [
+        "derive",
+        "--name",
+        "twice",
+        "--quantity",
+        "carbon_flux",
+        "--input",
+        "flux=fgco2",
+        "--expr",
+        "2 * flux",
+    ];
+    program::succeed(data, &derive).unwrap();
+    let mend = |product: &'static str| {
+        [
+            "recompute",
+            "--product",
+            product,
+            "--verify",
+            "--what",
+            "frames",
+        ]
+    };
+    let fields = |product: &str| files(&data.join("objects/frames").join(product));
+    flip(&fields("twice")[0]);
+    assert_eq!(named(data).len(), 1);
+    program::succeed(data, &mend("twice")).unwrap();
+    assert_eq!(named(data), [""; 0]);
+    for field in fields("fgco2-accumulated") {
+        flip(&field);
+    }
+    let refused = program::fail(data, &mend("fgco2-accumulated")).unwrap();
+    assert!(
+        refused.contains("fluxglobe recompute --product fgco2 --verify"),
+        "{refused}"
+    );
 }
 
 #[test]

@@ -28,12 +28,13 @@ use contract::manifest::{MANIFEST_SCHEMA, Manifest};
 use contract::product::ProductId;
 use contract::region::AskedRegion;
 use futures::future::BoxFuture;
-use storage::manifests;
+use storage::{manifests, verify};
 
 use super::Progress;
 use crate::made_from::{made_from, made_of};
 use crate::publish::{IsStillAsked, MADE_AGAIN, check_asked, publish_if};
 use crate::{ComputeError, Engine};
+use anomalies::Made;
 pub(crate) use kept::StatisticRequest;
 use landed::{Landing, computed};
 use plan::Plan;
@@ -118,7 +119,7 @@ pub(crate) fn derive_statistics_if<'a>(
         let plans: Vec<Plan> = plans.map(|one| one.plan.clone()).collect();
         let found = computed(engine, &sources, &plans, (&wanted, &stored), progress).await?;
         let mut found = found.into_iter();
-        let mut made = vec![];
+        let mut all = vec![];
         for Asked {
             sources,
             target,
@@ -126,19 +127,12 @@ pub(crate) fn derive_statistics_if<'a>(
             there,
         } in asked
         {
-            let computed = match there {
-                Some(There::AsItIs(latest)) => {
-                    made.push(latest);
-                    continue;
-                }
-                Some(There::Renewed(renewed)) => {
-                    made.push(publish_if(engine, renewed, None, is_still_asked).await?);
-                    continue;
-                }
-                None => found.next(),
-            };
+            if let Some(there) = there {
+                all.push(Landed::There(there));
+                continue;
+            }
             let none = || ComputeError::inconsistent("a statistic", "it was not computed");
-            let computed = computed.ok_or_else(none)?;
+            let computed = found.next().ok_or_else(none)?;
             let landing = Landing {
                 engine,
                 sources,
@@ -147,14 +141,40 @@ pub(crate) fn derive_statistics_if<'a>(
                 wanted: &wanted,
                 stored: &stored,
             };
-            let (derived, at_hand) = match plan.statistic {
+            all.push(Landed::New(match plan.statistic {
                 MapStatistic::Anomaly => landing.anomalies(computed, progress).await?,
                 _ => (landing.each(computed.maps).await?, None),
-            };
-            made.push(publish_if(engine, derived, at_hand, is_still_asked).await?);
+            }));
         }
-        Ok(made)
+        published(engine, all, is_still_asked).await
     })
+}
+
+/// A statistic of which everything but a new version is stored.
+enum Landed {
+    There(There),
+    New(Made),
+}
+
+/// Publishes all, each of which could be made: none is without the others because of one of them that cannot.
+async fn published(
+    engine: &Engine,
+    all: Vec<Landed>,
+    is_still_asked: Option<&IsStillAsked<'_>>,
+) -> Result<Vec<Manifest>, ComputeError> {
+    let mut published = vec![];
+    for one in all {
+        let (derived, at_hand) = match one {
+            Landed::There(There::AsItIs(latest)) => {
+                published.push(latest);
+                continue;
+            }
+            Landed::There(There::Renewed(renewed)) => (renewed, None),
+            Landed::New(made) => made,
+        };
+        published.push(publish_if(engine, derived, at_hand, is_still_asked).await?);
+    }
+    Ok(published)
 }
 
 /// The region of all that is derived together.
@@ -213,7 +233,9 @@ impl<'a> Asked<'a> {
                 check_statistic(&latest, options.statistic)?;
                 check_grid(engine, &latest, &plan, stored).await?;
             }
-            if plan.has_values_of(&latest, stored) {
+            if plan.has_values_of(&latest, stored)
+                && verify::has_own(engine.store(), &latest).await?
+            {
                 there = Some(if plan.is_said_by(&latest, sources.first) {
                     // Whoever published it may have been killed before the cube followed.
                     cube::keep_up(engine.store(), &latest).await;

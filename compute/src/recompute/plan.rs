@@ -124,24 +124,15 @@ async fn fields_there(
     target: &ProductId,
     request: &Request,
 ) -> Result<BTreeSet<ObjectKey>, ComputeError> {
-    let mut there = BTreeSet::new();
-    for kind in [Kind::Field, Kind::Contributed] {
-        let folder = kind.folder();
-        there.extend(store.list(&format!("{folder}/{target}")).await?);
-    }
-    let Some(latest) = latest.filter(|_| request.is_verified) else {
+    let mut there = verify::own_there(store, target).await?;
+    let Some(latest) = latest else {
         return Ok(there);
     };
-    let fields = latest.steps.iter().map(|step| &step.field);
-    let counts = latest
-        .steps
-        .iter()
-        .filter_map(|step| step.contributed.as_ref());
-    let counts = counts.map(|contributed| &contributed.counts);
-    let named = fields.chain(counts).chain([&latest.domain]);
-    let damaged = verify::damaged(store, named.cloned()).await?;
-    there.retain(|field| !damaged.contains(field));
-    if damaged.contains(&latest.domain) {
+    if request.is_verified {
+        let damaged = verify::damaged(store, verify::own_of(latest).cloned()).await?;
+        there.retain(|own| !damaged.contains(own));
+    }
+    if !there.contains(&latest.domain) {
         for step in &latest.steps {
             there.remove(&step.field);
         }

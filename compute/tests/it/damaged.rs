@@ -117,6 +117,17 @@ async fn a_flipped_bit_of_a_field_is_no_other_accumulated_carbon() {
     assert!(error.contains(field.as_str()), "{error}");
 }
 
+#[tokio::test(flavor = "multi_thread")]
+async fn a_field_that_is_gone_is_named_where_carbon_is_accumulated() {
+    let (_folder, store) = landed().await;
+    let key = first(&store, Kind::Field).await;
+    store.remove(&key).await.unwrap();
+    let engine = Engine::local(store.clone());
+    let derived = derive_accumulated(&engine, &product("wavy"), None, &|_| ()).await;
+    let error = derived.unwrap_err().to_string();
+    assert!(error.contains(key.as_str()), "{error}");
+}
+
 /// A damaged footer can make the Parquet library panic: the object is named all the same, whichever bit it was.
 #[tokio::test(flavor = "multi_thread")]
 async fn a_damaged_end_of_a_field_is_named_where_carbon_is_accumulated() {

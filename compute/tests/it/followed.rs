@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use compute::computed::{Request, RequestedInput, compute};
-use compute::dependents::{follow, follow_telling, why_it_stays};
+use compute::dependents::{follow, follow_telling, mend, why_it_stays};
 use compute::derive::{DeriveProgress, derive_statistic, derive_statistics};
 use compute::{Engine, derive_accumulated};
 use contract::analysis::{BasePeriod, MapStatistic};
@@ -285,6 +285,62 @@ async fn what_is_of_what_follows_is_made_once_and_of_its_newest_version() {
     // What follows a product in the middle is what is of that alone.
     let middle: Vec<_> = followed(&engine, "anomaly").await;
     assert_eq!(middle, [("all-spread".to_owned(), 2)]);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn of_several_statistics_none_is_made_where_one_cannot_be() {
+    let (_folder, store) = folder_store();
+    // No cell holds data all the time.
+    let mut steps = months(24, 1);
+    steps.remove(7);
+    land(&store, &product("sst"), Quantity::WindSpeed, GRID, &steps).await;
+    let engine = Engine::in_process(store.clone(), parts(2));
+    let all_the_time = MapOptions {
+        least_percent: 100,
+        ..MapOptions::new(MapStatistic::Mean)
+    };
+    let asked = [
+        named("count", MapOptions::new(MapStatistic::Count)),
+        named("mean", all_the_time),
+    ];
+    let refused = derive_statistics(&engine, &product("sst"), &asked, &|_| ()).await;
+    let refused = refused.unwrap_err().to_string();
+    assert!(refused.contains("no cell holds data"), "{refused}");
+    let count = manifests::latest(&store, &product("count")).await;
+    assert_eq!(count.unwrap(), None);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn what_is_damaged_or_gone_of_what_was_computed_is_made_again_under_its_name() {
+    let (_folder, store) = folder_store();
+    landed(&store, "sst", 12, 1).await;
+    let engine = Engine::in_process(store.clone(), parts(2));
+    let request = expression("twice", "2 * sst", &["sst"]);
+    let twice = computed(&engine, &request).await;
+    let options = named("mean", MapOptions::new(MapStatistic::Mean));
+    let mean = all_derived(&engine, std::slice::from_ref(&options)).await;
+    for made in [&twice, &mean[0]] {
+        for key in [&made.steps[0].field, &made.domain] {
+            let whole = store.get(key).await.unwrap();
+            let mut flipped = whole.to_vec();
+            flipped[whole.len() / 2] ^= 2;
+            store.put_over(key, flipped.into()).await.unwrap();
+            let mended = mend(&engine, &made.product).await.unwrap();
+            assert_eq!(mended.as_ref(), Some(made), "{key}");
+            assert_eq!(store.get(key).await.unwrap(), whole);
+            // Who asks for it again finds what is gone, too.
+            store.remove(key).await.unwrap();
+            let again = if made.product == twice.product {
+                computed(&engine, &request).await
+            } else {
+                let mut again = all_derived(&engine, std::slice::from_ref(&options)).await;
+                again.remove(0)
+            };
+            assert_eq!(again, *made, "{key}");
+            assert_eq!(store.get(key).await.unwrap(), whole);
+        }
+        assert_eq!(mend(&engine, &made.product).await.unwrap(), None);
+    }
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -92,15 +92,20 @@ async fn a_lost_field_is_planned_and_made_again_without_a_new_version() {
     let derived = derived.unwrap();
     let step = &derived.steps[8];
     let counts = &step.contributed.as_ref().unwrap().counts;
-    for lost in [&step.field, counts] {
+    for (lost, count) in [(&step.field, 4), (counts, 4), (&derived.domain, 12)] {
         std::fs::remove_file(folder.path().join(lost.as_str())).unwrap();
         let fields = request(&[What::Fields]);
         let mend = plan(&store, &fields).await.unwrap();
-        assert_eq!(mend.items.len(), 4, "{lost}");
+        assert_eq!(mend.items.len(), count, "{lost}");
         assert_eq!(mend.items[0].reason, Reason::Missing);
         let outcome = run(&engine, &mend, &|_done| ()).await.unwrap();
         assert_eq!(outcome.derived.unwrap(), derived);
         assert!(store.exists(lost).await.unwrap());
+        // Who derives it again finds what is gone, too.
+        std::fs::remove_file(folder.path().join(lost.as_str())).unwrap();
+        let again = derive_accumulated(&engine, &product("wavy"), None, &|_| ()).await;
+        assert_eq!(again.unwrap(), derived, "{lost}");
+        assert!(store.exists(lost).await.unwrap(), "{lost}");
     }
 }
 

@@ -254,6 +254,64 @@ async fn a_cube_that_is_behind_is_told_and_brought_up() {
 }
 
 #[tokio::test]
+async fn a_cube_that_nothing_was_committed_to_yet_is_behind_and_no_more() {
+    let inner = Store::memory();
+    let first = version(&inner, grid(40, 60), 1, &[(1, 1)]).await;
+    manifests::commit(&inner, &first).await.unwrap();
+    // Its field cannot be read, once its repository is made.
+    let (store, _removed) = watched(&inner, |key| {
+        let is_field = key.starts_with("frames/");
+        async move { if is_field { Err(broken()) } else { Ok(()) } }.boxed()
+    });
+    follow(&store, &first).await.unwrap_err();
+    let (product, entry) = ("p".parse().unwrap(), "cubes/p/repo".parse().unwrap());
+    assert!(inner.exists(&entry).await.unwrap());
+    // Who is killed earlier leaves what a repository begins with.
+    for is_made in [true, false] {
+        if !is_made {
+            inner.remove(&entry).await.unwrap();
+        }
+        let checked = verify::check(&inner, &product, &BTreeSet::new()).await;
+        let checked = checked.unwrap();
+        let [finding] = &checked.findings[..] else {
+            panic!("{checked:?}");
+        };
+        assert_eq!(finding.fault, Fault::Behind);
+        assert!(finding.reason.contains("none"), "{}", finding.reason);
+        let keep = Keep {
+            versions: 1,
+            age: Duration::from_hours(2),
+        };
+        let cleaned = clean_up::run(&inner, keep, in_hours(0), false).await;
+        let is_refused = |one: &clean_up::Cleaned| one.refused.is_some();
+        assert!(!cleaned.unwrap().iter().any(is_refused));
+    }
+    assert!(!verify::mend(&inner, &product).await.unwrap());
+    holds(&inner, At::Newest, &first, &[(1, 1)]).await;
+}
+
+#[tokio::test]
+async fn a_damaged_version_of_the_product_keeps_nobody_from_the_rest_of_its_cube() {
+    let store = Store::memory();
+    three_versions(&store).await;
+    let product = "p".parse().unwrap();
+    let newest = ObjectKey::manifest(&product, 3);
+    let mut flipped = store.get(&newest).await.unwrap().to_vec();
+    flipped[20] ^= 1;
+    store.put_over(&newest, flipped.into()).await.unwrap();
+    let chunk = store.list("cubes/p/chunks").await.unwrap().remove(0);
+    store.remove(&chunk).await.unwrap();
+    let damaged = BTreeSet::from([newest]);
+    let checked = verify::check(&store, &product, &damaged).await.unwrap();
+    let found: Vec<_> = checked
+        .findings
+        .iter()
+        .map(|it| (&it.key, it.fault))
+        .collect();
+    assert_eq!(found, [(&chunk, Fault::Missing)]);
+}
+
+#[tokio::test]
 async fn a_cube_that_is_made_again_is_found_damaged_until_all_of_it_is_gone() {
     let inner = Store::memory();
     three_versions(&inner).await;

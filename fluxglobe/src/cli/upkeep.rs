@@ -85,8 +85,8 @@ pub(crate) struct Recompute {
     /// Also what is there and right by its name: made again and compared.
     #[arg(long)]
     pub(crate) force: bool,
-    /// Read what is there first, and make again what is damaged: fields and domain from raw/, sums and tiles from
-    /// those.
+    /// Read what is there first, and make again what is damaged: fields and domain from raw/, or from what they are
+    /// computed from, sums and tiles from those.
     #[arg(long)]
     pub(crate) verify: bool,
     /// Show the plan and do nothing.

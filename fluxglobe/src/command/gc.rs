@@ -100,7 +100,7 @@ async fn cubes(store: &Store, keep: Keep, is_dry_run: bool) -> Result<()> {
     }
     if !left.is_empty() {
         bail!(
-            "cubes that cannot be read were left as they are; `fluxglobe recompute --product PRODUCT --verify` makes them again: {}",
+            "cubes were left as they are; what is damaged of one is made again by `fluxglobe recompute --product PRODUCT --verify`: {}",
             left.join("; ")
         );
     }

@@ -5,7 +5,9 @@
 mod files;
 mod tiles;
 
-use anyhow::Result;
+use std::collections::BTreeSet;
+
+use anyhow::{Result, bail};
 use comfy_table::Table;
 use comfy_table::presets::NOTHING;
 use compute::recompute::{Plan, Reason, Request, What};
@@ -13,6 +15,7 @@ use contract::event::Event;
 use contract::product::ProductId;
 use serde::Serialize;
 use storage::Store;
+use storage::log::EventLog;
 
 use super::behind::say_what_is_behind;
 use crate::cli::{Recompute, RecomputeWhat, Settings};
@@ -54,6 +57,9 @@ pub(crate) async fn run(settings: &Settings, options: Recompute) -> Result<()> {
     if let Some(files) = &files {
         files.read(&store, log.as_deref()).await?;
     }
+    if with_fields && options.verify {
+        computed(settings, &store, (&options.product, log.as_deref())).await?;
+    }
     // Planned anew: what was read just now makes stale what follows from it.
     let plan = self::plan(settings, &store, &options).await?;
     if !plan.items.is_empty() {
@@ -81,7 +87,50 @@ pub(crate) async fn run(settings: &Settings, options: Recompute) -> Result<()> {
         // Planned anew: what was derived just now gives pictures other names.
         let wanted = tiles::plan(&store, &options).await?;
         let kafka = options.kafka.kafka.is_some();
-        tiles::draw(settings, store, log.as_deref().filter(|_| kafka), &wanted).await?;
+        let told = log.as_deref().filter(|_| kafka);
+        tiles::draw(settings, store.clone(), told, &wanted).await?;
+    }
+    if with_fields && options.verify {
+        check_before(&store, &options.product).await?;
+    }
+    Ok(())
+}
+
+/// # Errors
+/// Something of a version before the newest one, which is not made again, is damaged or gone.
+async fn check_before(store: &Store, product: &ProductId) -> Result<()> {
+    let mut broken = BTreeSet::new();
+    for product in [Some(product.clone()), product.accumulated().ok()] {
+        let Some(product) = product else { continue };
+        broken.extend(storage::verify::broken_before(store, &product).await?);
+    }
+    let Some(first) = broken.first() else {
+        return Ok(());
+    };
+    bail!(
+        "{} objects of versions before the newest one are damaged or gone, and are not made again: {first}{}; restore them from a copy of the \
+         store, or have `fluxglobe gc` remove these versions",
+        broken.len(),
+        if broken.len() > 1 { " and others" } else { "" }
+    )
+}
+
+/// Makes a product that was computed from others again where it is damaged, before anything is made of it.
+async fn computed(
+    settings: &Settings,
+    store: &Store,
+    (product, log): (&ProductId, Option<&dyn EventLog>),
+) -> Result<()> {
+    let engine = deployment::engine(settings, store.clone())?;
+    let Some(made) = compute::dependents::mend(&engine, product).await? else {
+        return Ok(());
+    };
+    let id = made.id();
+    progress::say(&format!(
+        "{id}: what was damaged or gone of it is made again"
+    ));
+    if let (Some(log), Some(body)) = (log, compute::derive::derived(&made)) {
+        storage::log::tell_once(log, &Event::new(id.to_string(), body)).await?;
     }
     Ok(())
 }

@@ -4,8 +4,8 @@
 
 use contract::key::ObjectKey;
 
-use super::Soundness;
 use super::seal::{self, Seal};
+use super::{Soundness, UNSEALED};
 
 /// Folder of chunks.
 const CHUNKS: &str = "chunks";
@@ -46,6 +46,17 @@ pub fn check(name: &str, content: &[u8]) -> Result<Soundness, &'static str> {
         Seal::Whole => Ok(Soundness::Sound),
         Seal::Broken => Err("its bytes are not those that were sealed"),
         Seal::Absent => Ok(Soundness::Unsealed),
+    }
+}
+
+/// The same of a cube in a store: nobody else writes there, and all that is there was sealed.
+///
+/// # Errors
+/// Why it is not what was stored.
+pub fn check_own(name: &str, content: &[u8]) -> Result<(), &'static str> {
+    match check(name, content)? {
+        Soundness::Sound => Ok(()),
+        Soundness::Unsealed => Err(UNSEALED),
     }
 }
 
@@ -147,6 +158,18 @@ mod tests {
         assert_eq!(sealed("chunks/A", b""), None);
         assert_eq!(check("repo", b"of others"), Ok(Soundness::Unsealed));
         assert!(check("chunks/A", b"").is_err());
+    }
+
+    #[test]
+    fn what_names_chunks_and_lost_its_seal_is_damaged_in_a_store() {
+        let whole = sealed("snapshots/A", b"compressed").unwrap();
+        let key: ObjectKey = "cubes/p/snapshots/A".parse().unwrap();
+        let is_sound = |content: &[u8]| super::super::of_bytes(&key, content).is_ok();
+        assert!(is_sound(&whole));
+        for length in 0..whole.len() {
+            assert!(!is_sound(&whole[..length]), "{length} bytes");
+        }
+        assert!(!is_sound(&[&whole[..], b"x"].concat()));
     }
 
     #[test]

@@ -1,0 +1,62 @@
+//! A product that was computed here in; the same product out, what was damaged or gone of it made again.
+
+use contract::ContractError;
+use contract::manifest::Manifest;
+use contract::product::ProductId;
+use futures::future::BoxFuture;
+use storage::verify;
+
+use super::recipe::Recipe;
+use crate::computed::compute;
+use crate::derive::{accumulated_from, derive_statistic};
+use crate::{ComputeError, Engine, catalogue};
+
+/// Makes a computed product or a statistic again of what it is made of now, where fields of its newest version or its domain are damaged or
+/// gone; the version that has it then. None if all is whole, and of what landed, which is read again from its files.
+///
+/// # Errors
+/// It cannot be made again by itself, with what to do: it is accumulated, which its flux says how, or how it was made is not kept.
+pub fn mend<'a>(
+    engine: &'a Engine,
+    product: &'a ProductId,
+) -> BoxFuture<'a, Result<Option<Manifest>, ComputeError>> {
+    Box::pin(async move {
+        let store = engine.store();
+        let newest = catalogue::product(store, product).await?;
+        if newest.derived_from.is_none() {
+            return Ok(None);
+        }
+        let broken = verify::broken(store, &newest).await?;
+        if broken.is_empty() {
+            return Ok(None);
+        }
+        let refused = |reason: String| ContractError::invalid("product", product.as_str(), reason);
+        let count = broken.len();
+        if let Some(flux) = accumulated_from(&newest) {
+            let flux = &flux.product;
+            return Err(refused(format!(
+                "{count} of its objects are damaged or gone, and it is accumulated from {flux}: `fluxglobe recompute --product {flux} --verify` makes them again"
+            ))
+            .into());
+        }
+        // Who makes it keeps what is there.
+        for key in &broken {
+            store.remove(key).await?;
+        }
+        Ok(Some(match Recipe::of(&newest)? {
+            Some(Recipe::Computed(request)) => {
+                compute(engine, &request, &|_progress| ()).await?.manifest
+            }
+            Some(Recipe::Statistic(request)) => {
+                let (of, options) = (&request.product, &request.options);
+                derive_statistic(engine, of, options, &|_progress| ()).await?
+            }
+            Some(Recipe::Accumulated(_)) | None => {
+                return Err(refused(format!(
+                    "{count} of its objects were damaged or are gone, and how it was made is not kept: `fluxglobe derive` makes it again, asked as it was"
+                ))
+                .into());
+            }
+        }))
+    })
+}
