@@ -7,6 +7,9 @@ use serde::{Deserialize, Serialize};
 const VALUE_BITS: i32 = 44;
 /// The same of the square of a value.
 const SQUARE_BITS: i32 = 48;
+/// Least standard deviation in units of the scale that sums of squares tell, as a power of two. Each square is rounded by half a step or less, 2⁻⁴⁹: of a
+/// variance of 2⁻⁴⁰ that is a five-hundredth.
+const LEAST_STD_BITS: i32 = 20;
 /// Largest value in units of the scale: twice what can be true.
 const LIMIT: f64 = 2.0;
 /// Added to a number below 2⁵¹, it leaves the nearest integer in the lowest bits (halves to even).
@@ -140,6 +143,11 @@ impl Scale {
         // Rounding may leave a constant a hair below zero.
         (of_squares - mean * mean).max(0.0).sqrt()
     }
+
+    /// Do sums of squares tell this standard deviation, to a thousandth? Of values that differ by less it is mostly what rounding made of them.
+    pub fn tells_std(self, std: f64) -> bool {
+        std >= self.unit() * f64::from(-LEAST_STD_BITS).exp2()
+    }
 }
 
 /// Counts values in steps of a scale.
@@ -260,7 +268,8 @@ mod tests {
         };
         let (mean, std) = of(&[290.0, 292.0]);
         assert!((mean - 291.0).abs() < 1e-9 && (std - 1.0).abs() < 1e-9);
+        assert!(scale.tells_std(std));
         let (_mean, std) = of(&[271.25; 7]);
-        assert!(std < 1e-4, "{std}");
+        assert!(std < 1e-4 && !scale.tells_std(std), "{std}");
     }
 }

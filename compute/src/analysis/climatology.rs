@@ -126,16 +126,17 @@ pub fn less_their_months(months: &[usize], values: &[f64]) -> Vec<f64> {
 /// What is left of a value that is taken off from itself, as a share of the largest: rounding. Stored values have seven digits.
 const ROUNDING: f64 = 1e-12;
 
+/// How far apart values may lie that would be equal but for rounding, once means or a line were taken off: of the values before that.
+pub fn rounding_of(values: &[f64]) -> f64 {
+    let present = values.iter().filter(|value| !value.is_nan());
+    ROUNDING * present.fold(0.0, |most: f64, value| most.max(value.abs()))
+}
+
 /// [`less_their_months`]; of a season and nothing else nothing is left, not even rounding.
 pub fn less_their_months_exactly(months: &[usize], values: &[f64]) -> Vec<f64> {
-    let present = values.iter().filter(|value| !value.is_nan());
-    let largest = present.fold(0.0, |most: f64, value| most.max(value.abs()));
+    let rounding = rounding_of(values);
     let left = |value: f64| {
-        if value.abs() <= ROUNDING * largest {
-            0.0
-        } else {
-            value
-        }
+        if value.abs() <= rounding { 0.0 } else { value }
     };
     let less = less_their_months(months, values);
     less.into_iter().map(left).collect()

@@ -77,7 +77,7 @@ impl<'a> Slopes<'a> {
     /// Lower and upper end of the interval that holds the slope with 95 %: Sen's equation 2.6 with the variance of the score
     /// times `variance_correction`, which is 1 for values that do not go together.
     pub fn interval(self, variance_correction: f64) -> (f64, f64) {
-        let variance = score_variance(self.values) * variance_correction.max(0.0);
+        let variance = score_variance(self.values, 0.0) * variance_correction.max(0.0);
         let reach = normal_quantile() * variance.sqrt();
         let n = self.count as f64;
         // As scipy rounds it: half a rank to the even one.

@@ -144,7 +144,8 @@ pub fn difference<'a>(
         }
         let a = read::series(engine, of.0, of.1, least).await?;
         let b = read::series(engine, minus.0, minus.1, least).await?;
-        if a.cited.unit != b.cited.unit || a.cited.quantity != b.cited.quantity {
+        let is_same_kind = a.cited.quantity.is_same_kind(b.cited.quantity);
+        if a.cited.unit != b.cited.unit || !is_same_kind {
             let reason = format!(
                 "{} holds {}, {} holds {}: they have no difference",
                 a.cited.product,

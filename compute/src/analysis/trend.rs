@@ -7,7 +7,7 @@ use contract::analysis::{
 };
 use contract::time::{Period, TimeMs, TimeStep};
 
-use super::climatology::{Seasonless, mean, months_of};
+use super::climatology::{Seasonless, mean, months_of, rounding_of};
 use super::extremes::percentile;
 use super::linear_trend::least_squares;
 use super::mann_kendall::{LEAST_VALUES, MOST_VALUES, mann_kendall};
@@ -230,7 +230,9 @@ impl Basis {
             .season
             .as_ref()
             .map_or(&self.values, |season| &season.less);
-        Ok((slopes, slope, mann_kendall(tested, &detrended)?))
+        // The two values that Sen's slope lies between are equal without it, but for rounding; so are others where values have few digits.
+        let test = mann_kendall(tested, &detrended, rounding_of(&self.means))?;
+        Ok((slopes, slope, test))
     }
 
     /// How many times as large the variance of a slope is as without means of parts of the year beside it: times vary by less beside them, and each takes a

@@ -1,6 +1,8 @@
 //! Statistics of a version over a geometry: what is asked put together, passes over the values, rows.
 
-use std::collections::BTreeMap;
+mod small_stds;
+
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
 use contract::cited::Cited;
@@ -69,12 +71,15 @@ pub fn statistics_of<'a>(
         let inside = (window, inside.len());
         let asked = Reduction::of(engine, (manifest, &id), &weighed, inside).await?;
         let (bins, scales) = asked.summed(&periods, &bins, wanted(query)).await?;
+        let small_stds = asked.small_stds(query, (&bins, &scales), &periods);
+        let small_stds = small_stds.await?;
         let percentiles = asked.percentiles(query, &bins, &periods).await?;
         let rows = Rows {
             query,
             weighed: &weighed,
             display: manifest.quantity.display(),
             scales: &scales,
+            small_stds: &small_stds,
             steps: &periods,
             percentiles: &percentiles,
         };
@@ -215,17 +220,28 @@ impl<'a> Reduction<'a> {
         let steps_of = steps_of.map(|times| times.into_iter().map(|(step, _)| step).collect());
         let steps_of: Vec<Vec<u32>> = steps_of.collect();
         for small in small_bins(&self.extremes, &steps_of) {
-            let question = self.question(small.scale, wanted.clone());
-            // Runs along time are read whole, with larger values in them.
-            let fields = self.fields_alone(small.steps.iter().copied());
-            let found = self.of_fields(question, fields).await?;
             let periods_of: Vec<Period> = small.bins.iter().map(|bin| bins[*bin]).collect();
-            let own = bin_sums(periods, &periods_of, &found).ok_or_else(too_large)?;
-            for (bin, own) in small.bins.into_iter().zip(own) {
+            let asked = (small.scale, wanted.clone());
+            let own = self.summed_again(asked, &small.steps, (periods, &periods_of));
+            for (bin, own) in small.bins.into_iter().zip(own.await?) {
                 (sums[bin], scales[bin]) = (own, small.scale);
             }
         }
         Ok((sums, scales))
+    }
+
+    /// Sums of some bins in a scale that holds all values of their `steps`.
+    async fn summed_again(
+        &self,
+        (scale, wanted): (Scale, Wanted),
+        steps: &BTreeSet<u32>,
+        (periods, bins): (&[Period], &[Period]),
+    ) -> Result<Vec<BinSums>, ComputeError> {
+        let question = self.question(scale, wanted);
+        // Runs along time are read whole, with larger values in them.
+        let fields = self.fields_alone(steps.iter().copied());
+        let found = self.of_fields(question, fields).await?;
+        bin_sums(periods, bins, &found).ok_or_else(too_large)
     }
 
     fn version(&self) -> Version<'_> {
@@ -337,6 +353,8 @@ struct Rows<'a> {
     display: Display,
     /// What each bin was summed in.
     scales: &'a [Scale],
+    /// Standard deviations that this does not tell, stored unit, by the numbers of their bins.
+    small_stds: &'a BTreeMap<usize, f64>,
     steps: &'a [Period],
     percentiles: &'a BTreeMap<(usize, Percentile), f32>,
 }
@@ -389,7 +407,8 @@ impl Rows<'_> {
             Statistic::Min => Some(shown(sums.min.into())),
             Statistic::Max => Some(shown(sums.max.into())),
             Statistic::Std => {
-                let std = scale.std(sums.squares, sums.sum, sums.weight);
+                let told = self.small_stds.get(&at).copied();
+                let std = told.unwrap_or_else(|| scale.std(sums.squares, sums.sum, sums.weight));
                 Some(std * self.display.factor.abs())
             }
             Statistic::Median | Statistic::Percentile(_) => {

@@ -455,6 +455,34 @@ async fn periods_versions_and_products_are_compared() {
     }
 }
 
+/// Ranges of quantities that nothing is built in for are those of the values that a version holds.
+#[tokio::test(flavor = "multi_thread")]
+async fn versions_and_products_of_an_open_quantity_are_compared_whatever_their_ranges() {
+    let (_folder, store) = folder_store();
+    let open = Quantity::open("mole_flux", "mol m-2 s-1", "Mole flux").unwrap();
+    let other = Quantity::open("mole_flux", "mol m-2", "Moles").unwrap();
+    let landed = async |name: &str, quantity: Quantity, value: f32| {
+        let quantity = quantity.over([0.0, value.into()]).unwrap();
+        let steps = months(24, |_, _| value);
+        land(&store, &product(name), quantity, GRID, &steps).await
+    };
+    let first = landed("mole-flux", open, 3.0).await;
+    let second = landed("mole-flux", open, 4.5).await;
+    let beside = landed("beside", open, 1.0).await;
+    let amount = landed("amount", other, 1.0).await;
+    let engine = Engine::in_process(store.clone(), parts(2));
+    let all = region("mole-flux", "-140,-19,-120,-10");
+    for (minus, wanted) in [(&first, 1.5), (&beside, 3.5)] {
+        let series = all.of_product(minus.product.clone());
+        let found = differ(&engine, (&second, &all), (minus, &series)).await;
+        let found = found.unwrap().difference.unwrap();
+        assert!((found - wanted).abs() < 1e-6, "{found}");
+    }
+    let series = all.of_product(amount.product.clone());
+    let refused = differ(&engine, (&second, &all), (&amount, &series)).await;
+    assert_eq!(refused.unwrap_err().class(), ErrorClass::BadRequest);
+}
+
 /// Of a year of seasons the winters at its ends count by the months that it has of them, wherever values are of.
 #[tokio::test(flavor = "multi_thread")]
 async fn steps_across_the_ends_of_a_period_count_by_their_time_in_it_in_every_kind_of_place() {

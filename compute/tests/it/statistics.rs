@@ -464,6 +464,48 @@ async fn a_step_that_lies_across_two_rows_counts_in_both_by_its_time() {
     assert!((of(1, "min") - 1.0).abs() < 1e-6 && (of(1, "max") - 4.0).abs() < 1e-6);
 }
 
+/// Squares of all that a flux can be have steps in which values that are equal, or nearly so, are not: 0.001 g C m⁻² yr⁻¹ of nothing.
+#[tokio::test(flavor = "multi_thread")]
+async fn equal_values_have_no_deviation_and_those_that_differ_by_little_have_theirs() {
+    let (_folder, store) = folder_store();
+    let month = |month: u32| Period::month(2001, month).unwrap();
+    let steps: Vec<(Period, Vec<f32>)> = (1..=12)
+        .map(|at| {
+            let around = 1.3e-9 * (at as f32).sqrt();
+            let apart = if at > 8 { 1e-14 * (at as f32) } else { 0.0 };
+            let value = |cell: usize| around + apart * (cell % 5) as f32;
+            (month(at), (0..GRID.cell_count()).map(value).collect())
+        })
+        .collect();
+    land(&store, &product("wavy"), Quantity::CarbonFlux, GRID, &steps).await;
+    let query = asked(area("-40,-20,-10,10"), "std,mean", TimeStep::Native);
+    let answer = statistics(&Engine::local(store.clone()), &query).await;
+    let answer = answer.unwrap();
+    let in_parts = Engine::in_process(store.clone(), parts(3));
+    let other = statistics(&in_parts, &query).await.unwrap();
+    let region = "-40,-20,-10,10".parse().unwrap();
+    let weights = weights::compute(&GRID, &region, Earth::Wgs84).unwrap();
+    let factor = Quantity::CarbonFlux.display().factor;
+    for (row, step) in steps.iter().enumerate() {
+        let std = value(&answer, row, "std");
+        assert_eq!(std.to_bits(), value(&other, row, "std").to_bits());
+        if row < 8 {
+            assert_eq!(std.to_bits(), 0.0f64.to_bits(), "{row}: {std}");
+            continue;
+        }
+        let held = weighed(std::slice::from_ref(step), &weights, &GRID);
+        let right = plain(&held, 50.0)[1] * factor;
+        assert!((std / right - 1.0).abs() < 1e-5, "{row}: {std} {right}");
+    }
+    // One value has none.
+    let place = LonLatDeg::new(-20.0, 5.0).unwrap();
+    let cell = AskedGeometry::point(place, Sampling::Cell);
+    let one = asked(cell, "std", TimeStep::Native);
+    let one = statistics(&Engine::local(store), &one).await.unwrap();
+    let none = |row| value(&one, row, "std").to_bits() == 0.0f64.to_bits();
+    assert!((0..12).all(none), "{one:?}");
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn what_cannot_be_answered_is_refused_with_the_reason() {
     let (_folder, store, _manifest, _steps) = landed().await;

@@ -9,11 +9,11 @@ fn detrended(values: &[f64], slope: f64) -> Vec<f64> {
 /// `tests/reference/series_statistics.py`.
 #[test]
 fn scores_and_variances_are_those_of_an_independent_library() {
-    assert_eq!(score(&SERIES), 277);
-    near(score_variance(&SERIES), 3_137.666_666_666_666_5, 1e-12);
-    let correction = variance_correction(&detrended(&SERIES, 0.095));
+    assert_eq!(score(&SERIES, 0.0), 277);
+    near(score_variance(&SERIES, 0.0), 3_137.666_666_666_666_5, 1e-12);
+    let correction = variance_correction(&detrended(&SERIES, 0.095), 0.0);
     near(correction, 2.375_111_329_939_134_7, 1e-9);
-    let found = mann_kendall(&SERIES, &detrended(&SERIES, 0.095)).unwrap();
+    let found = mann_kendall(&SERIES, &detrended(&SERIES, 0.095), 0.0).unwrap();
     near(found.z, 3.197_155_020_290_662_5, 1e-9);
     near(found.p_value, 0.001_387_903_159_439_2, 1e-8);
     near(found.tau, 0.636_781_609_195_402_3, 1e-12);
@@ -21,14 +21,14 @@ fn scores_and_variances_are_those_of_an_independent_library() {
     let to_and_fro: Vec<f64> = (0..30)
         .map(|i| [0.0, 2.0][i % 2] + 0.1 * i as f64)
         .collect();
-    let found = mann_kendall(&to_and_fro, &detrended(&to_and_fro, 0.1)).unwrap();
+    let found = mann_kendall(&to_and_fro, &detrended(&to_and_fro, 0.1), 0.0).unwrap();
     near(found.variance_correction, 1.0, 1e-15);
 }
 
 /// The same script.
 #[test]
 fn autocorrelation_takes_significance_away() {
-    let found = mann_kendall(&SLOW, &detrended(&SLOW, 0.060_869_565_217)).unwrap();
+    let found = mann_kendall(&SLOW, &detrended(&SLOW, 0.060_869_565_217), 0.0).unwrap();
     assert_eq!(found.score, 173);
     near(found.variance_correction, 5.377_692_310_401_308, 1e-9);
     near(found.z, 1.324_119_160_166_555_6, 1e-9);
@@ -57,7 +57,7 @@ fn noise_that_goes_together_has_few_trends() {
             let slope = crate::analysis::theil_sen::Slopes::of(&years, &series)
                 .unwrap()
                 .median();
-            let test = mann_kendall(&series, &detrended(&series, slope)).unwrap();
+            let test = mann_kendall(&series, &detrended(&series, slope), 0.0).unwrap();
             found += u32::from(test.p_value < 0.05);
         }
         assert!((least..most).contains(&found), "{kept}: {found} of 400");
@@ -66,7 +66,7 @@ fn noise_that_goes_together_has_few_trends() {
 
 #[test]
 fn too_few_equal_and_too_many_values_are_refused_with_the_reason() {
-    let refused = |values: &[f64]| mann_kendall(values, values).unwrap_err().to_string();
+    let refused = |values: &[f64]| mann_kendall(values, values, 0.0).unwrap_err().to_string();
     let mut few = vec![f64::NAN; 40];
     few[..9].copy_from_slice(&SERIES[..9]);
     assert_eq!(
@@ -86,7 +86,34 @@ fn gaps_leave_the_score_of_the_rest_and_wander_no_less() {
     let mut gaps = SLOW.to_vec();
     (gaps[4], gaps[12], gaps[13]) = (f64::NAN, f64::NAN, f64::NAN);
     let present: Vec<f64> = gaps.iter().copied().filter(|v| !v.is_nan()).collect();
-    let found = mann_kendall(&gaps, &detrended(&gaps, 0.06)).unwrap();
-    assert_eq!(found.score, score(&present));
+    let found = mann_kendall(&gaps, &detrended(&gaps, 0.06), 0.0).unwrap();
+    assert_eq!(found.score, score(&present, 0.0));
     assert!(found.variance_correction > 2.0, "{found:?}");
+}
+
+/// Of the same values in kelvins and in degrees Celsius, whose means are rounded at other digits.
+#[test]
+fn values_that_rounding_alone_tells_apart_are_equal() {
+    // Many are equal once a line is taken off.
+    let celsius = |i: usize| [4.3, 1.1, 2.7, 0.9, 3.3][i % 5] + 0.1 * (i / 5) as f64;
+    let of = |offset: f64, rounding: f64| {
+        let values: Vec<f64> = (0..20).map(|i| celsius(i) + offset).collect();
+        let mean = values.iter().sum::<f64>() / 20.0;
+        let less: Vec<f64> = values.iter().map(|value| value - mean).collect();
+        mann_kendall(&less, &detrended(&less, 0.02), rounding).unwrap()
+    };
+    let (kelvins, celsius) = (of(273.15, 1e-9), of(0.0, 1e-9));
+    assert_eq!(kelvins, celsius);
+    let spaced: Vec<f64> = (0..20).map(|i| f64::from(i / 2)).collect();
+    let shaken: Vec<f64> = (0..20)
+        .map(|i| f64::from(i / 2) + f64::from(i % 2) * 1e-13)
+        .collect();
+    assert_eq!(score(&shaken, 1e-12), score(&spaced, 0.0));
+    assert_eq!(ranks(&shaken, 1e-12), ranks(&spaced, 0.0));
+    near(
+        score_variance(&shaken, 1e-12),
+        score_variance(&spaced, 0.0),
+        1e-15,
+    );
+    assert_eq!(score(&shaken, 0.0), score(&spaced, 0.0) + 10);
 }
