@@ -78,7 +78,7 @@ test: checkout test-tools $(viewer) ## Everything that CI runs
 	cargo fmt --all --check
 	$(FLUXGLOBE_TOOLS)/bin/typos
 	cd tile-server/web && npm run check && npm test
-	cargo build --locked --workspace --lib --bins --tests
+	tests/run.py --build
 	deploy/services/services.sh install
 	rm -f $(not_run)
 	fluxengine=$$(tests/data/fetch.sh) && FLUXGLOBE_FLUXENGINE=$$fluxengine FLUXGLOBE_SKIPPED=$(not_run) \

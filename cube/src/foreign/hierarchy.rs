@@ -408,7 +408,7 @@ async fn documents(
         Err(e) if kind == StoreKind::Zarr2 && e.cause == Cause::Access => None,
         content => content?,
     };
-    let Some(content) = content.map(adapter::plain) else {
+    let Some(content) = content.map(|content| adapter::plain(&content)) else {
         return Ok(all);
     };
     let place = format!("{}/{name}", objects.place());

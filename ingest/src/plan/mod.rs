@@ -175,7 +175,9 @@ pub(crate) async fn plan(
         let untold = || Some(carbon_flux::told(variable)?.err()?.note(&variable.name));
         let note = written::note(description, variable).or_else(untold);
         let note = note.filter(|_| written::of_file(description, variable).is_none());
-        note.into_iter().for_each(|note| planning.assume(note));
+        if let Some(note) = note {
+            planning.assume(note);
+        }
     }
     let target = target::target(&planning, variable, wish, meaning.quantity)?;
     let steps = steps::convert(variable, profile, meaning, &periods)?;

@@ -206,7 +206,8 @@ async fn values_are_those_that_xarray_finds_and_nothing_is_written_there() {
 /// Numbers that JSON does not have, as the library for Python writes them in attributes, of arrays beside each other and consolidated.
 #[tokio::test]
 async fn nan_in_the_attributes_of_a_store_is_read() {
-    let cases: [(&str, &str, fn(&mut Value) -> &mut Value); 3] = [
+    type Place = fn(&mut Value) -> &mut Value;
+    let cases: [(&str, &str, Place); 3] = [
         ("v2-plain.zarr", "sst/.zattrs", |it| it),
         (
             "v2-blosc.zarr",

@@ -366,7 +366,7 @@ async fn longitudes_in_degrees_west_lie_in_the_west() {
         file.write(&place.path("a.nc"));
         let outcome = place.land(&[place.path("a.nc")]).await.remove(0);
         let told = assumed(&outcome);
-        assert!(told.iter().all(|line| !line.starts_with("l")), "{told:?}");
+        assert!(told.iter().all(|line| !line.starts_with('l')), "{told:?}");
         let Outcome::Landed { manifest, .. } = &outcome else {
             panic!("{outcome}")
         };
