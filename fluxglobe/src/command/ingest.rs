@@ -90,6 +90,9 @@ struct Line {
     /// Values that the file gave and that are none here, by why; absent of what did not land.
     #[serde(skip_serializing_if = "Option::is_none")]
     masked: Option<MaskedCells>,
+    /// What was taken for granted of a file that lands, and which of its steps are left out; absent if nothing.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    assumptions: Vec<String>,
 }
 
 impl Line {
@@ -118,6 +121,34 @@ impl Line {
             reason,
             detail,
             masked: outcome.masked(),
+            assumptions: match outcome {
+                Outcome::Landed { assumptions, .. } => assumptions.clone(),
+                _ => vec![],
+            },
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_told_of_a_file_is_told_to_machines_too() {
+        let landed = |assumptions: Vec<String>| {
+            let outcome = Outcome::Landed {
+                file: "a.nc".into(),
+                manifest: "p@1-5b70ea82".parse().unwrap(),
+                periods: vec![],
+                revised: false,
+                profile: None,
+                assumptions,
+                masked: MaskedCells::default(),
+            };
+            serde_json::to_value(Line::of(&outcome)).unwrap()
+        };
+        let told = "p: holds no value in 2 of 3 steps";
+        assert_eq!(landed(vec![told.to_owned()])["assumptions"][0], told);
+        assert_eq!(landed(vec![]).get("assumptions"), None);
     }
 }

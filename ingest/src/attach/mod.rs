@@ -71,7 +71,7 @@ pub struct Attached {
     pub stored_bytes: u64,
     /// What was masked in the steps that were read.
     pub masked: MaskedCells,
-    /// What was taken for granted, because nothing there says it. One line each.
+    /// What was taken for granted, because nothing there says it, and which steps are left out. One line each.
     pub assumptions: Vec<String>,
 }
 

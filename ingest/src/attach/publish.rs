@@ -18,7 +18,7 @@ use super::steps::{self, Put};
 use super::survey::Survey;
 use crate::commit;
 use crate::error::{IngestError, Rejection, Stop};
-use crate::pipeline::grids::without_values;
+use crate::pipeline::grids::{left_out, without_values};
 use crate::plan::PlannedStep;
 
 /// Reads all steps and publishes them as the next version; of a product that is attached to something else only if it may `replace`
@@ -73,6 +73,8 @@ pub(super) async fn publish(
         return Err(without_values(&plan, read.masked).into());
     }
     read.steps.sort_by_key(|step| step.period);
+    let told_of_steps = left_out(&plan, &read.steps);
+    plan.assumptions.extend(told_of_steps);
     // The way back, before anybody goes it: address, credentials and all that the attachment keeps.
     let first = fields::read(store, &read.steps[0].field, &plan.mapping.grid).await;
     first.map_err(IngestError::storage("read an attached step again"))?;

@@ -27,7 +27,7 @@ pub enum Outcome {
         revised: bool,
         /// Name of the profile that it was read with; none for a file that follows CF.
         profile: Option<String>,
-        /// What was taken for granted, because nothing in the file says it. One line each.
+        /// What was taken for granted, because nothing in the file says it, and which steps are left out. One line each.
         assumptions: Vec<String>,
         /// Cells that it gave a value for and that hold none, steps without any value among them.
         masked: MaskedCells,

@@ -1,6 +1,7 @@
 //! [`PlannedGranule`] in, its [`Reading`] out: steps are decoded one after the other, band by band, and checked, encoded and put
 //! a few at a time.
 
+use std::collections::BTreeSet;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::pin::pin;
@@ -27,7 +28,7 @@ use crate::encode::{EncodedGrid, Encoding};
 use crate::error::{IngestError, Rejection, Stop};
 use crate::fetch::RawGranule;
 use crate::limits::memory;
-use crate::plan::{Plan, PlannedGranule};
+use crate::plan::{self, Plan, PlannedGranule};
 use crate::put::reading::Reading;
 use crate::{decode, put};
 
@@ -67,6 +68,8 @@ impl Pipeline<'_> {
             return Err(without_values(&plan, masked).into());
         }
         steps.sort_by_key(|step| step.period);
+        let told = left_out(&plan, &steps);
+        plan.assumptions.extend(told);
         let Plan {
             target,
             mapping,
@@ -353,6 +356,23 @@ pub(crate) fn without_values(plan: &Plan, masked: MaskedCells) -> Rejection {
         ),
     };
     Rejection::new(RejectReason::Values, &plan.variable.name, detail)
+}
+
+/// What is told of steps of a plan that hold no value, where others do: `steps` are those.
+pub(crate) fn left_out(plan: &Plan, steps: &[Step]) -> Option<String> {
+    let there: BTreeSet<Period> = steps.iter().map(|step| step.period).collect();
+    let planned = plan.steps.iter().map(|step| step.period);
+    let mut empty: Vec<Period> = planned.filter(|own| !there.contains(own)).collect();
+    empty.sort_unstable();
+    let (first, all) = (empty.first()?, plan.steps.len());
+    let told = match empty.len() {
+        1 => format!("1 of {all} steps, {first}, which is left out"),
+        count => format!("{count} of {all} steps, which are left out; the first is {first}"),
+    };
+    Some(plan::line(format!(
+        "{}: holds no value in {told}",
+        plan.variable.name
+    )))
 }
 
 /// The field that a version has for a period.

@@ -21,8 +21,8 @@ use crate::plan::profile::Profile;
 /// 7: scales, offsets and fill values count that are written as text, what is made of synthetic products is synthetic, and notes tell how
 ///    far before the poles a grid ends whose latitudes are evened.
 /// 8: places in degrees west and south are turned, bounds and the time coordinate that cannot be read are not taken for none, valid ranges
-///    count that are written as text, packed bounds of times are unpacked, weeks are not counted from 1 January, and differences of
-///    temperatures and percentiles are not taken for the quantity.
+///    count that are written as text, packed bounds of times are unpacked, weeks are not counted from 1 January, differences of
+///    temperatures and percentiles are not taken for the quantity, and notes tell of steps without any value.
 pub(crate) const DECODER: u32 = 8;
 
 /// How a file was read.

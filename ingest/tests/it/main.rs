@@ -6,6 +6,7 @@
 mod attached;
 mod attached_again;
 mod attached_bounds;
+mod attached_cubes;
 mod attached_moved;
 mod attached_shards;
 mod attached_web;

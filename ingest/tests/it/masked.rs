@@ -12,6 +12,7 @@ use prometheus::Registry;
 use storage::log::{EmbeddedLog, EventLog};
 
 use crate::fixture::{FILL, Place, SmallFile, events, open_again, refusal, settings};
+use crate::made::{Made, MadeFile, Values};
 use crate::service::run_until;
 
 /// No flux is as high: 2.6e-4 kg C m-2 s-1.
@@ -153,6 +154,38 @@ async fn a_step_that_is_masked_whole_is_counted() {
         line.contains("64 values masked (64 outside the valid range)"),
         "{line}"
     );
+}
+
+/// They are in no manifest, so that a product begins after its file, or ends before it.
+#[tokio::test]
+async fn steps_without_any_value_are_told() {
+    let place = Place::new();
+    let mut file = SmallFile::new();
+    file.values[..CELLS].fill(FILL);
+    let path = place.path("first.nc");
+    file.write_classic(&path);
+    let outcomes = place.land(&[path]).await;
+    let told = "fgco2: holds no value in 1 of 2 steps, 2001-01-01T00:00:00Z/2001-02-01T00:00:00Z, which is left out";
+    let line = outcomes[0].to_string();
+    assert!(line.contains(told), "{line}");
+    assert_eq!(outcomes[0].masked(), Some(masked(0, 0)));
+    assert_eq!(place.newest("fgco2").await.steps.len(), 1);
+    let landed = events(&place.log, Topic::GranuleLanded).await;
+    let Body::GranuleLanded { assumptions, .. } = &landed[0].body else {
+        panic!("{landed:?}")
+    };
+    assert!(assumptions.iter().any(|own| own == told), "{assumptions:?}");
+
+    let days = place.path("days.nc");
+    let values = [vec![f32::NAN; 2 * CELLS], vec![20.0; CELLS]].concat();
+    let file = MadeFile::sst(3).but("sst", |own| Made {
+        values: Values::Floats(values),
+        ..own
+    });
+    file.write(&days);
+    let line = place.land(&[days]).await[0].to_string();
+    let told = "sst: holds no value in 2 of 3 steps, which are left out; the first is 200";
+    assert!(line.contains(told), "{line}");
 }
 
 /// More than one in twenty is a wrong unit or scale, and refused as ever; what the file calls empty counts for nothing.
