@@ -161,6 +161,9 @@ async fn computed(settings: &Settings, kafka: &KafkaSettings, request: &Request)
             manifest.quantity.word()
         ));
     }
+    if let Some(line) = without_data(manifest) {
+        progress::say(&line);
+    }
     for (name, count) in &outcome.outside {
         progress::say(&format!(
             "{name} was called {count} times outside the range that its paper gives"
@@ -168,6 +171,17 @@ async fn computed(settings: &Settings, kafka: &KafkaSettings, request: &Request)
     }
     progress::result(&manifest.id().to_string())?;
     say_what_is_behind(engine.store(), [&manifest.product]).await
+}
+
+/// What is said of steps of which no cell holds data; none if there is no such one.
+fn without_data(manifest: &Manifest) -> Option<String> {
+    let mut empty = manifest.steps.iter().filter(|step| step.valid_cells == 0);
+    let (first, all) = (empty.next()?, manifest.steps.len());
+    Some(format!(
+        "no cell holds data in {} of {all} steps; the first is {}",
+        1 + empty.count(),
+        first.period
+    ))
 }
 
 fn functions() -> Result<()> {
@@ -252,4 +266,59 @@ pub(crate) async fn accumulated(
         &format!("{} fields of {}", manifest.steps.len(), manifest.product),
     );
     Ok(manifest)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use contract::digest::Digest;
+    use contract::grid::Grid;
+    use contract::manifest::{MANIFEST_SCHEMA, Step};
+    use contract::time::Period;
+
+    /// A version with as many cells with data in the months of 2001.
+    fn computed(valid_cells: &[u64]) -> Manifest {
+        let step = |(month, valid_cells): (u32, &u64)| Step {
+            masked: None,
+            period: Period::month(2001, month).unwrap(),
+            field: "frames/p/a".parse().unwrap(),
+            raw_sha256: Digest::of(b"a job"),
+            origin: "made by a test".to_owned(),
+            valid_cells: *valid_cells,
+            contributed: None,
+        };
+        Manifest {
+            schema: MANIFEST_SCHEMA,
+            product: "p".parse().unwrap(),
+            number: 1,
+            title: "P".to_owned(),
+            quantity: Quantity::SeaSurfaceTemperature,
+            synthetic: true,
+            source: "made by a test".to_owned(),
+            grid: Grid {
+                rows: 2,
+                cols: 3,
+                north_deg: 1.0,
+                west_deg: 0.0,
+                dlat_deg: 1.0,
+                dlon_deg: 1.0,
+            },
+            steps: (1..).zip(valid_cells).map(step).collect(),
+            domain: "domain/p/a".parse().unwrap(),
+            series: vec![],
+            derived_from: None,
+            computed: None,
+            notices: vec![],
+        }
+    }
+
+    #[test]
+    fn steps_of_which_no_cell_holds_data_are_told() {
+        assert_eq!(without_data(&computed(&[1, 6])), None);
+        let told = without_data(&computed(&[1, 0, 6, 0])).unwrap();
+        assert_eq!(
+            told,
+            "no cell holds data in 2 of 4 steps; the first is 2001-02-01T00:00:00Z/2001-03-01T00:00:00Z"
+        );
+    }
 }
