@@ -164,6 +164,8 @@ pub(crate) async fn plan(
         let time = planning.time_variable(&axes);
         method::check(variable, meaning.quantity, time.as_deref())?;
         written::check(description, variable, meaning.quantity)?;
+        let told = written::climatology(description, variable);
+        told.iter().for_each(|told| planning.assume(told));
     }
     if matches!(meaning.quantity, Quantity::Open(_)) && open::stated_unit(variable).is_none() {
         planning.assume(format!(

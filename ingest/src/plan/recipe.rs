@@ -22,7 +22,7 @@ use crate::plan::profile::Profile;
 ///    far before the poles a grid ends whose latitudes are evened.
 /// 8: places in degrees west and south are turned, bounds and the time coordinate that cannot be read are not taken for none, valid ranges
 ///    count that are written as text, packed bounds of times are unpacked, weeks are not counted from 1 January, differences of
-///    temperatures and percentiles are not taken for the quantity, and notes tell of steps without any value.
+///    temperatures and percentiles are not taken for the quantity, and notes tell of steps without any value and of climatologies.
 pub(crate) const DECODER: u32 = 8;
 
 /// How a file was read.

@@ -75,6 +75,17 @@ pub(crate) fn note(file: &description::Description, variable: &Variable) -> Opti
     ))
 }
 
+/// What is told of the cube or the export of a climatology: its periods are those of one year, its values are not.
+pub(crate) fn climatology(file: &description::Description, variable: &Variable) -> Option<String> {
+    let own = exported(file, variable)?;
+    matches!(own.statistic, Some(MapStatistic::Climatology)).then(|| {
+        format!(
+            "{}: holds a climatology ({}); its steps are means over years and not those of the year that they lie in",
+            variable.name, own.title
+        )
+    })
+}
+
 /// Does a cube or an export of this program say of its values, whatever they are, that they are made up?
 pub(crate) fn is_synthetic(attributes: &Map<String, Value>) -> bool {
     Description::read(attributes, "").is_ok_and(|own| own.synthetic)
@@ -198,6 +209,19 @@ mod tests {
             assert_eq!(found.is_ok(), is_fine, "{statistic}");
             assert!(check(&file, &variable, trend).is_ok(), "{statistic}");
         }
+    }
+
+    #[test]
+    fn a_climatology_is_told_and_nothing_else_is() {
+        for (statistic, is_told) in [("climatology", true), ("mean", false), ("max", false)] {
+            let (file, mut variable) = file(Some(statistic.parse().unwrap()), "up");
+            let told = climatology(&file, &variable);
+            assert_eq!(told.is_some(), is_told, "{statistic}: {told:?}");
+            variable.name = "another".to_owned();
+            assert_eq!(climatology(&file, &variable), None, "{statistic}");
+        }
+        let (file, variable) = file(None, "up");
+        assert_eq!(climatology(&file, &variable), None);
     }
 
     #[test]

@@ -62,3 +62,21 @@ async fn steps_without_any_value_are_told() {
         attached.assumptions
     );
 }
+
+#[tokio::test]
+async fn a_climatology_is_told_from_months_of_a_year() {
+    for (statistic, is_told) in [(Some(MapStatistic::Climatology), true), (None, false)] {
+        let own = Own::new();
+        let attached = attach(&own, statistic, &[281.0, 282.0]).await;
+        assert_eq!(attached.steps, 2);
+        let told =
+            "sea_surface_temperature: holds a climatology (Theirs, monthly climatology 1991/2020)";
+        let mut all = attached.assumptions.iter();
+        assert_eq!(
+            all.any(|own| own.starts_with(told)),
+            is_told,
+            "{:?}",
+            attached.assumptions
+        );
+    }
+}
