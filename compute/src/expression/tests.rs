@@ -239,7 +239,7 @@ fn an_input_that_is_called_as_a_word_of_sql_is_told_how_it_is_written() {
         ("any".to_owned(), Unit::ONE),
     ];
     let read = |text: &str| Expression::read(text, &inputs).map(|_| ());
-    let refused = read("any * 2").unwrap_err();
+    let refused = read("2 * any").unwrap_err();
     assert!(refused.contains("the input any is called as"), "{refused}");
     assert_eq!(read("\"any\" * \"sst-2010\""), Ok(()));
 }
