@@ -39,24 +39,27 @@ pub fn mend<'a>(
             ))
             .into());
         }
+        let Some(recipe) = Recipe::of(&newest)? else {
+            return Err(refused(format!(
+                "{count} of its objects are damaged or gone, and how it was made is not kept: `fluxglobe derive` makes it again, asked as it was"
+            ))
+            .into());
+        };
         // Who makes it keeps what is there.
         for key in &broken {
             store.remove(key).await?;
         }
-        Ok(Some(match Recipe::of(&newest)? {
-            Some(Recipe::Computed(request)) => {
-                compute(engine, &request, &|_progress| ()).await?.manifest
+        Ok(match recipe {
+            Recipe::Computed(request) => {
+                let made = compute(engine, &request, &|_progress| ()).await?;
+                Some(made.manifest)
             }
-            Some(Recipe::Statistic(request)) => {
+            Recipe::Statistic(request) => {
                 let (of, options) = (&request.product, &request.options);
-                derive_statistic(engine, of, options, &|_progress| ()).await?
+                Some(derive_statistic(engine, of, options, &|_progress| ()).await?)
             }
-            Some(Recipe::Accumulated(_)) | None => {
-                return Err(refused(format!(
-                    "{count} of its objects were damaged or are gone, and how it was made is not kept: `fluxglobe derive` makes it again, asked as it was"
-                ))
-                .into());
-            }
-        }))
+            // A manifest keeps no such recipe.
+            Recipe::Accumulated(_) => None,
+        })
     })
 }

@@ -27,7 +27,7 @@ use super::scales::{Extremes, between, small_bins};
 use super::tasks::Version;
 use super::weighed::Weighed;
 use crate::budget::rows::coverage_percent;
-use crate::summed::{check_averaged, check_averaged_in_a_cell};
+use crate::summed::{check_averaged, check_averaged_in_a_cell, holds_codes};
 use crate::{ComputeError, Engine, catalogue};
 
 /// Statistics of the newest version of a product.
@@ -49,7 +49,13 @@ pub fn statistics_of<'a>(
     id: ManifestId,
 ) -> BoxFuture<'a, Result<StatisticsAnswer, ComputeError>> {
     Box::pin(async move {
-        let counts = |one: Statistic| matches!(one, Statistic::Count | Statistic::Coverage);
+        let are_codes = holds_codes(manifest);
+        // The least and the greatest of codes are codes of these cells.
+        let averages_none = |one: Statistic| match one {
+            Statistic::Count | Statistic::Coverage => true,
+            Statistic::Min | Statistic::Max => are_codes,
+            _ => false,
+        };
         let is_one_cell = matches!(
             query.geometry,
             Geometry::Point {
@@ -57,7 +63,7 @@ pub fn statistics_of<'a>(
                 ..
             }
         );
-        if !query.statistics.iter().all(counts) {
+        if !query.statistics.iter().all(averages_none) {
             match (is_one_cell, query.step) {
                 (false, _) => check_averaged(manifest)?,
                 (true, TimeStep::Native) => {}

@@ -451,18 +451,21 @@ async fn codes_are_compared_in_expressions_and_neither_computed_with_nor_average
     let found = values(&store, &share, 0).await;
     let is_one: Vec<bool> = found[..3].iter().map(|share| *share > 0.5).collect();
     assert_eq!(is_one, [false, true, true]);
-    let mean = |of: &str| StatisticsQuery {
+    let over = |of: &str, statistic: &str| StatisticsQuery {
         product: product(of),
         ..crate::statistics::asked(
             crate::statistics::area("-60,-20,60,20"),
-            "mean",
+            statistic,
             TimeStep::Native,
         )
     };
-    let found = statistics(&engine, &mean("share")).await.unwrap();
+    let found = statistics(&engine, &over("mask", "min,max")).await;
+    let found = &found.unwrap().rows[0].values;
+    assert_eq!([found["min"], found["max"]], [Some(0.0), Some(2.0)]);
+    let found = statistics(&engine, &over("share", "mean")).await.unwrap();
     let found = found.rows[0].values["mean"].unwrap();
     assert!((0.5..0.8).contains(&found), "{found}");
-    let error = statistics(&engine, &mean("mask")).await;
+    let error = statistics(&engine, &over("mask", "mean")).await;
     let error = error.unwrap_err().to_string();
     assert!(error.contains("it holds codes"), "{error}");
     let mask = manifests::latest(&store, &product("mask")).await;

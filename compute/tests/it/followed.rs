@@ -341,6 +341,29 @@ async fn what_is_damaged_or_gone_of_what_was_computed_is_made_again_under_its_na
         }
         assert_eq!(mend(&engine, &made.product).await.unwrap(), None);
     }
+    // What cannot be made again stays as it is.
+    let flux = land(
+        &store,
+        &product("old"),
+        Quantity::WindSpeed,
+        GRID,
+        &months(1, 1),
+    )
+    .await;
+    let old = Manifest {
+        number: flux.number + 1,
+        derived_from: Some(twice.id()),
+        ..flux
+    };
+    manifests::commit(&store, &old).await.unwrap();
+    let field = &old.steps[0].field;
+    let mut flipped = store.get(field).await.unwrap().to_vec();
+    let middle = flipped.len() / 2;
+    flipped[middle] ^= 2;
+    store.put_over(field, flipped.into()).await.unwrap();
+    let refused = mend(&engine, &old.product).await.unwrap_err().to_string();
+    assert!(refused.contains("how it was made is not kept"), "{refused}");
+    assert!(store.exists(field).await.unwrap());
 }
 
 #[tokio::test(flavor = "multi_thread")]
