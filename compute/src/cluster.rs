@@ -107,6 +107,14 @@ pub(crate) struct Cluster {
 }
 
 impl Cluster {
+    /// A failure of it, with the address that it was given by: a name may be wrong.
+    pub(crate) fn away(&self, error: ComputeError) -> ComputeError {
+        ComputeError::ClusterAway {
+            scheduler: self.scheduler.to_string(),
+            source: Box::new(error),
+        }
+    }
+
     /// The session whose queries go to the scheduler. Nothing is connected yet: each query connects by itself.
     pub(crate) fn session(
         &self,

@@ -172,6 +172,14 @@ pub enum ComputeError {
         /// How long it was waited for, s.
         limit_s: u64,
     },
+    /// The cluster is away, or lost a query for as long as it was asked again.
+    #[error("the cluster of {scheduler} (--cluster or FLUXGLOBE_CLUSTER) gave no answer: {source}")]
+    ClusterAway {
+        /// Address of its scheduler.
+        scheduler: String,
+        /// Why the last try failed.
+        source: Box<Self>,
+    },
     /// A scheduler's address that cannot be one.
     #[error("scheduler address {url:?}: {reason}; give host:port, such as scheduler:50050")]
     SchedulerUrl {
@@ -240,6 +248,7 @@ impl ComputeError {
             Self::Cluster { source, .. } => {
                 retryable_if(failure::of_ballista(source) == Failure::Passing)
             }
+            Self::ClusterAway { source, .. } => source.class(),
             Self::Overdue { .. } | Self::AskedOtherwise { .. } | Self::OtherMethod { .. } => {
                 ErrorClass::Retryable
             }

@@ -261,7 +261,10 @@ impl Engine {
     pub fn ready(&self) -> BoxFuture<'_, Result<(), ComputeError>> {
         Box::pin(async move {
             match &self.inner.kind {
-                Kind::Cluster(cluster) => cluster.scheduler.answers().await,
+                Kind::Cluster(cluster) => {
+                    let answers = cluster.scheduler.answers().await;
+                    answers.map_err(|error| cluster.away(error))
+                }
                 Kind::Standalone | Kind::Local => Ok(()),
             }
         })
@@ -293,10 +296,11 @@ impl Engine {
                     });
                 }
             };
+            let scheduler = &cluster.scheduler;
             let Some(pause) = pauses.next() else {
-                return Err(error);
+                return Err(cluster.away(error));
             };
-            tracing::warn!(job = name, %error, "the cluster lost a query; asking again");
+            tracing::warn!(job = name, %scheduler, %error, "the cluster lost a query; asking again");
             tokio::time::sleep(pause).await;
         }
     }
@@ -454,7 +458,12 @@ mod tests {
         let nowhere = "http://127.0.0.1:1".parse().unwrap();
         let engine = Engine::cluster(Store::memory(), nowhere, NonZeroUsize::MIN)
             .with_retry_limit(Duration::from_millis(500));
-        assert!(engine.ready().await.is_err());
+        let is_named = |error: &ComputeError| {
+            let told = error.to_string();
+            told.contains("http://127.0.0.1:1 ") && told.contains("FLUXGLOBE_CLUSTER")
+        };
+        let away = engine.ready().await.unwrap_err();
+        assert!(is_named(&away), "{away}");
         let tries = std::sync::atomic::AtomicU32::new(0);
         let ask = |context: QueryContext| {
             tries.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
@@ -465,7 +474,7 @@ mod tests {
             }
         };
         let error = engine.answer(Digest::of(b"test"), ask).await.unwrap_err();
-        assert!(error.is_retryable(), "{error}");
+        assert!(error.is_retryable() && is_named(&error), "{error}");
         assert!(tries.into_inner() > 1, "asked once only");
     }
 

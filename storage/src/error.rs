@@ -1,5 +1,6 @@
 //! What can go wrong between a service and its durable things.
 
+use std::io::ErrorKind;
 use std::path::PathBuf;
 
 use contract::key::ObjectKey;
@@ -66,6 +67,32 @@ impl StorageError {
         )
     }
 
+    /// Is it that the store takes nothing: it may not be written, or there is no room in it? What is there can be read.
+    pub fn takes_nothing(&self) -> bool {
+        use object_store::Error;
+        match self {
+            Self::Object { source, .. } => match source {
+                Error::PermissionDenied { .. } => true,
+                Error::Generic { source, .. } => io_kinds(source.as_ref()).any(|kind| {
+                    matches!(
+                        kind,
+                        ErrorKind::PermissionDenied
+                            | ErrorKind::ReadOnlyFilesystem
+                            | ErrorKind::StorageFull
+                            | ErrorKind::QuotaExceeded
+                    )
+                }),
+                _ => false,
+            },
+            Self::Conflict { .. }
+            | Self::Damaged { .. }
+            | Self::Spool { .. }
+            | Self::Location { .. }
+            | Self::Log { .. }
+            | Self::LogSetup { .. } => false,
+        }
+    }
+
     /// Why a field of an attached product could not be read, if that is what failed.
     pub fn attached(&self) -> Option<&Failure> {
         Failure::behind(self)
@@ -101,8 +128,8 @@ fn of_object(key: &str, source: &object_store::Error) -> String {
 /// May the same request to an object store succeed later?
 ///
 /// Clients put whatever they do not tell apart into one kind, `Generic`: there the cause decides. A full disk may be
-/// emptied and a server may come back; a request that a server finds wrong (400 to 499), a part behind the end of an object, or a
-/// folder that may not be written, stays as it is.
+/// emptied and a server may come back; a request that a server finds wrong (400 to 499), a part behind the end of an object, a
+/// folder that may not be written, or a file larger than its file system takes, stays as it is.
 pub(crate) fn may_pass(error: &object_store::Error) -> bool {
     use object_store::Error;
     match error {
@@ -120,7 +147,6 @@ pub(crate) fn may_pass(error: &object_store::Error) -> bool {
 }
 
 fn is_final(cause: &(dyn std::error::Error + 'static)) -> bool {
-    use std::io::ErrorKind;
     // Requests that were too slow, too many, or in each other's way.
     const PASSING: [&str; 3] = ["408", "409", "429"];
     // An object that is shorter than whoever asks for a part of it was told: in memory, and twice of a folder.
@@ -141,16 +167,22 @@ fn is_final(cause: &(dyn std::error::Error + 'static)) -> bool {
     if SHORT.iter().any(|short| text.contains(short)) {
         return true;
     }
+    io_kinds(cause).any(|kind| {
+        matches!(
+            kind,
+            ErrorKind::PermissionDenied
+                | ErrorKind::ReadOnlyFilesystem
+                | ErrorKind::NotADirectory
+                | ErrorKind::FileTooLarge
+        )
+    })
+}
+
+/// What the system said, of an error and of what is behind it.
+fn io_kinds(cause: &(dyn std::error::Error + 'static)) -> impl Iterator<Item = ErrorKind> {
     std::iter::successors(Some(cause), |cause| cause.source())
         .filter_map(|cause| cause.downcast_ref::<std::io::Error>())
-        .any(|io| {
-            matches!(
-                io.kind(),
-                ErrorKind::PermissionDenied
-                    | ErrorKind::ReadOnlyFilesystem
-                    | ErrorKind::NotADirectory
-            )
-        })
+        .map(std::io::Error::kind)
 }
 
 #[cfg(test)]
@@ -160,7 +192,7 @@ mod tests {
     use object_store::memory::InMemory;
     use object_store::path::Path;
     use object_store::{ObjectStore, ObjectStoreExt as _};
-    use std::io::{Error as IoError, ErrorKind};
+    use std::io::Error as IoError;
     use std::sync::Arc;
 
     fn generic(source: impl Into<Box<dyn std::error::Error + Send + Sync>>) -> object_store::Error {
@@ -182,6 +214,29 @@ mod tests {
         assert!(!may_pass(&generic(IoError::from(
             ErrorKind::ReadOnlyFilesystem
         ))));
+        assert!(!may_pass(&generic(IoError::from(ErrorKind::FileTooLarge))));
+    }
+
+    #[test]
+    fn a_store_that_takes_nothing_is_told_from_one_that_is_away() {
+        let of = |source| StorageError::Object {
+            key: "a".to_owned(),
+            source,
+        };
+        for kind in [
+            ErrorKind::StorageFull,
+            ErrorKind::QuotaExceeded,
+            ErrorKind::ReadOnlyFilesystem,
+        ] {
+            assert!(of(generic(IoError::from(kind))).takes_nothing(), "{kind}");
+        }
+        let denied = object_store::Error::PermissionDenied {
+            path: "a".to_owned(),
+            source: "read only".into(),
+        };
+        assert!(of(denied).takes_nothing());
+        assert!(!of(generic(IoError::from(ErrorKind::ConnectionRefused))).takes_nothing());
+        assert!(!of(generic("no answer within 60 s")).takes_nothing());
     }
 
     #[tokio::test]

@@ -24,6 +24,8 @@ mod settings;
 mod shared_parts;
 mod swap;
 mod traffic;
+#[cfg(test)]
+mod warnings;
 
 use std::fmt::{Debug, Formatter};
 use std::path::{Path as FilePath, PathBuf};

@@ -35,16 +35,47 @@ impl RegionAddress {
         }
     }
 
-    /// The weights of a region, stored now if the engine may; none if it lies outside the grid.
+    /// The weights of a region, stored now if the engine may and the store takes them; none if it lies outside the grid.
     pub(crate) async fn of(
         engine: &Engine,
         asked: OnGrid<'_>,
     ) -> Result<Option<Self>, ComputeError> {
         let store = engine.store();
         if engine.stores_weights() || is_for_everybody(asked) {
-            let keys = RegionKeys::stored_of(store, asked).await?;
-            return Ok(keys.map(|keys| Self::stored(store, keys)));
+            return match RegionKeys::stored_of(store, asked).await {
+                Ok(keys) => Ok(keys.map(|keys| Self::stored(store, keys))),
+                Err(ComputeError::Storage(error)) if error.takes_nothing() => {
+                    Self::unstored(engine, asked, error).await
+                }
+                Err(error) => Err(error),
+            };
         }
+        Self::asked(engine, asked).await
+    }
+
+    /// Weights that the store does not take: they are computed for this question alone.
+    ///
+    /// # Errors
+    /// That of the store for a region so large that its weights must be stored.
+    async fn unstored(
+        engine: &Engine,
+        asked: OnGrid<'_>,
+        refusal: StorageError,
+    ) -> Result<Option<Self>, ComputeError> {
+        match Self::asked(engine, asked).await {
+            // What this would say is to ask with a command, which stores them.
+            Err(ComputeError::Region { .. }) => Err(refusal.into()),
+            Err(error) => Err(error),
+            Ok(found) => {
+                tracing::warn!(error = %refusal, "weights of the region are not stored; they are computed for this question");
+                Ok(found)
+            }
+        }
+    }
+
+    /// Weights of which those that nobody stored are a question.
+    async fn asked(engine: &Engine, asked: OnGrid<'_>) -> Result<Option<Self>, ComputeError> {
+        let store = engine.store();
         let keys = RegionKeys::of(asked);
         let all = found_or_asked(store, &keys.all, asked, &Surface::All).await?;
         let ocean = found_or_asked(store, &keys.ocean, asked, asked.ocean).await?;

@@ -1,6 +1,8 @@
 //! Questions of strangers: however many regions they think of, the store stays as it is, and the answers are those of
 //! everybody.
 
+use std::sync::Arc;
+
 use compute::budget::budget;
 use compute::stats::region_series;
 use compute::{Engine, derive_accumulated};
@@ -12,6 +14,7 @@ use contract::series::RegionSeriesQuery;
 use storage::Store;
 
 use crate::fixture::{ONE_DEGREE, folder_store, land, parts, product, total, wavy_year};
+use crate::troubled::Troubled;
 
 /// Boxes and polygons that nobody asked for before.
 fn regions() -> Vec<String> {
@@ -124,4 +127,29 @@ async fn named_regions_are_stored_once_for_everybody() {
     };
     budget(&engine, &sphere).await.unwrap();
     assert_eq!(objects(&store).await, once);
+}
+
+/// Whoever may only read a store has the answers of everybody, of named regions too.
+#[tokio::test(flavor = "multi_thread")]
+async fn what_cannot_be_stored_is_computed_for_the_question() {
+    // Not in a folder, which creates its objects beside the layer.
+    let store = Store::memory();
+    let months = &wavy_year(&ONE_DEGREE)[..3];
+    let flux = Quantity::CarbonFlux;
+    land(&store, &product("wavy"), flux, ONE_DEGREE, months).await;
+    let locked = store.through(|inner| Arc::new(Troubled::read_only(inner)));
+    let before = objects(&store).await;
+    let (boxed, named) = (regions().swap_remove(0), "14n-50n".to_owned());
+    let mut answers = vec![];
+    for region in [&boxed, &named] {
+        let query = total(&product("wavy"), region);
+        let answer = budget(&Engine::local(locked.clone()), &query).await;
+        answers.push((query, answer.unwrap().rows));
+    }
+    assert_eq!(objects(&store).await, before, "something was stored");
+    for (query, rows) in answers {
+        let own = budget(&Engine::local(store.clone()), &query).await.unwrap();
+        assert_eq!(rows, own.rows, "{}", query.region_name);
+    }
+    assert_eq!(objects(&store).await, before + 4, "the lock was none");
 }

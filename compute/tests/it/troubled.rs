@@ -1,4 +1,4 @@
-//! An object store with troubles: slow for ever, or failing for a while after the first read.
+//! An object store with troubles: slow for ever, failing for a while after the first read, or never to be written.
 
 use std::fmt::{Display, Formatter};
 use std::ops::Range;
@@ -20,6 +20,7 @@ pub(crate) struct Troubled {
     delay: Duration,
     fails_for: Duration,
     begun: OnceLock<Instant>,
+    takes_writes: bool,
 }
 
 impl Troubled {
@@ -29,7 +30,26 @@ impl Troubled {
             delay,
             fails_for,
             begun: OnceLock::new(),
+            takes_writes: true,
         }
+    }
+
+    /// One that may be read and not written.
+    pub(crate) fn read_only(inner: Arc<dyn ObjectStore>) -> Self {
+        Self {
+            takes_writes: false,
+            ..Self::new(inner, Duration::ZERO, Duration::ZERO)
+        }
+    }
+
+    fn take(&self, at: &Path) -> Result<()> {
+        if self.takes_writes {
+            return Ok(());
+        }
+        Err(Error::PermissionDenied {
+            path: at.to_string(),
+            source: "Read-only file system".into(),
+        })
     }
 
     async fn trouble(&self) -> Result<()> {
@@ -54,6 +74,7 @@ impl Display for Troubled {
 #[async_trait]
 impl ObjectStore for Troubled {
     async fn put_opts(&self, at: &Path, what: PutPayload, o: PutOptions) -> Result<PutResult> {
+        self.take(at)?;
         self.inner.put_opts(at, what, o).await
     }
 
@@ -62,6 +83,7 @@ impl ObjectStore for Troubled {
         at: &Path,
         o: PutMultipartOptions,
     ) -> Result<Box<dyn MultipartUpload>> {
+        self.take(at)?;
         self.inner.put_multipart_opts(at, o).await
     }
 

@@ -200,7 +200,8 @@ pub(crate) struct StatsHovmoller {
     /// hold data, of all else of the region's sea in the band. 0 if absent.
     #[arg(long, value_name = "PERCENT")]
     pub(crate) min_coverage: Option<MinCoverage>,
-    /// First instant: 2000, 2000-03, 2000-03-15 or with a time of day. The product's first if absent.
+    /// First instant: 2000, 2000-03, 2000-03-15 or with a time of day. The product's first if absent. A step
+    /// that lies partly in the period counts by its time inside.
     #[arg(long)]
     pub(crate) from: Option<TimeMs>,
     /// First instant after the period. The product's end if absent.

@@ -25,7 +25,8 @@ pub(crate) struct Budget {
     /// or MASK:CODE, the cells where a landed mask has a code, or what it means: basins:5, basins:southern.
     #[arg(long, default_value = "global", allow_hyphen_values = true)]
     pub(crate) region: String,
-    /// First instant: 2000, 2000-03, 2000-03-15 or with a time of day. The product's first if absent.
+    /// First instant: 2000, 2000-03, 2000-03-15 or with a time of day. The product's first if absent. A step
+    /// that lies partly in the period counts by the share of its time.
     #[arg(long)]
     pub(crate) from: Option<TimeMs>,
     /// First instant after the period. The product's end if absent.

@@ -96,10 +96,11 @@ pub(crate) struct About {
     /// Title of the product; made of what it is if absent.
     #[arg(long)]
     pub(crate) title: Option<String>,
-    /// First instant; the first of the inputs if absent.
+    /// First instant; the first of the inputs if absent. Every step that reaches into the period is computed, and whole: of months
+    /// --from 2004-08-02 has all of August.
     #[arg(long)]
     pub(crate) from: Option<TimeMs>,
-    /// First instant after the period.
+    /// First instant after the period; a step that it lies in is computed whole.
     #[arg(long)]
     pub(crate) to: Option<TimeMs>,
     #[command(flatten, next_help_heading = "Kafka")]

@@ -85,10 +85,10 @@ pub(crate) struct DeriveStatistic {
     #[arg(long, default_value_t, value_name = "month|season")]
     pub(crate) bins: CalendarBins,
     /// First instant of the steps that are read, or of anomalies that are written; not of a climatology with a --base, which says it. The
-    /// product's first if absent.
+    /// product's first if absent. Every step that reaches into the period counts, and whole: of months --from 2004-08-02 has all of August.
     #[arg(long)]
     pub(crate) from: Option<TimeMs>,
-    /// First instant after them. The product's end if absent.
+    /// First instant after them; a step that it lies in counts whole. The product's end if absent.
     #[arg(long)]
     pub(crate) to: Option<TimeMs>,
     /// Share of the time, of a bin's steps or of all pairs of steps that must hold data for a cell to have a value, percent.

@@ -62,6 +62,7 @@ impl Store {
             return Err(StorageError::damaged(key.as_str(), reason));
         }
         let mut pauses = self.retry_limits.backoff().pauses();
+        let mut is_told = false;
         loop {
             let error = match self.create(key, &content).await {
                 Ok(()) => return Ok(true),
@@ -78,7 +79,14 @@ impl Store {
             let Some(pause) = pauses.next() else {
                 return Err(failed(key, error));
             };
-            tracing::info!(%key, %error, "not there after a doubtful answer: sent again");
+            if is_told {
+                tracing::info!(%key, %error, "not there after a doubtful answer: sent again");
+            } else {
+                // Whoever waits for a command is to see why: the disk may be full.
+                let retries_s = self.retry_limits.retries.as_secs_f64();
+                tracing::warn!(%key, %error, "not stored: tried again for at most {retries_s} s");
+                is_told = true;
+            }
             tokio::time::sleep(pause).await;
         }
     }

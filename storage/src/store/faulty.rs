@@ -68,6 +68,14 @@ pub(super) fn broken() -> Error {
     }
 }
 
+/// The disk has no room; it may have some later.
+pub(super) fn full() -> Error {
+    Error::Generic {
+        store: "faulty",
+        source: std::io::Error::from(std::io::ErrorKind::StorageFull).into(),
+    }
+}
+
 /// "Already exists", as stores say it whether or not it is true.
 pub(super) fn exists() -> Error {
     Error::AlreadyExists {

@@ -98,10 +98,18 @@ impl RetryStore {
             let answer = call(Arc::clone(&client));
             async move { self.bounded(limit, &client, answer).await }
         };
+        let retries = self.shared.retry_limits.retries;
+        let mut is_told = false;
         once.retry(self.shared.retry_limits.backoff().pauses())
             .when(is_worth_a_try)
             .notify(|error, pause| {
-                tracing::info!(%error, pause_ms = pause.as_millis() as u64, "trying the store again");
+                if is_told {
+                    tracing::info!(%error, pause_ms = pause.as_millis() as u64, "trying the store again");
+                } else {
+                    let retries_s = retries.as_secs_f64();
+                    tracing::warn!(%error, "the store failed: tried again for at most {retries_s} s");
+                    is_told = true;
+                }
             })
             .await
     }

@@ -2,7 +2,8 @@
 
 use super::*;
 use crate::store::RetryLimits;
-use crate::store::faulty::{Fault, Faulty, absent, broken, denied, exists};
+use crate::store::faulty::{Fault, Faulty, absent, broken, denied, exists, full};
+use crate::store::warnings::Warnings;
 use contract::digest::Digest;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -66,6 +67,25 @@ async fn a_store_that_stays_broken_ends_in_a_retryable_error() {
     let error = store(&faulty).put_new(&key(), Bytes::from("x")).await;
     assert!(error.unwrap_err().is_retryable());
     assert!(faulty.put_count() > 1 && begun.elapsed() < Duration::from_secs(30));
+}
+
+#[tokio::test]
+async fn why_a_full_store_is_waited_for_is_told_once_and_at_once() {
+    let (warned, _guard) = Warnings::kept();
+    let faulty = Faulty::always(Fault::Fail(full));
+    let error = store(&faulty)
+        .put_new(&key(), Bytes::from("x"))
+        .await
+        .unwrap_err();
+    assert!(error.is_retryable() && error.takes_nothing(), "{error}");
+    assert!(faulty.put_count() > 2, "it was not waited for");
+    let lines = warned.lines();
+    let [line] = &lines[..] else {
+        panic!("{lines:?}");
+    };
+    for part in [key().as_str(), &full().to_string(), "at most 0.6 s"] {
+        assert!(line.contains(part), "{line}");
+    }
 }
 
 #[tokio::test]

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::store::faulty::{Fault, Faulty, broken, denied, exists};
+use crate::store::warnings::Warnings;
 use bytes::Bytes;
 use object_store::ObjectStoreExt as _;
 use std::sync::Mutex;
@@ -25,9 +26,14 @@ fn here() -> Path {
 
 #[tokio::test]
 async fn a_failure_that_passes_is_waited_for() {
+    let (warned, _guard) = Warnings::kept();
     let inner = Faulty::new([Fault::Fail(broken), Fault::Hang, Fault::Fail(broken)]);
     retrying(&inner).put(&here(), "x".into()).await.unwrap();
     assert_eq!(inner.put_count(), 4);
+    // The first failure is told with its reason, and for how long there will be others.
+    let lines = warned.lines();
+    let is_told = |line: &String| line.contains("500") && line.contains("at most 1.5 s");
+    assert!(lines.len() == 1 && is_told(&lines[0]), "{lines:?}");
 }
 
 #[tokio::test]
