@@ -338,10 +338,15 @@ async fn matchup(settings: &Settings, options: &Matchup) -> Result<()> {
     matched.left_out.depth = chosen.left_out.depth;
     if matched.rows.is_empty() {
         bail!(
-            "no observation has a value of {} beside it: {}; the product covers {}, and --from, --to and --region say which observations are taken",
+            "no observation has a value of {} beside it: {}; the product covers {}, and --from, --to and --region say which observations are taken{}",
             matched.manifest,
             without_partner(matched.left_out),
-            covered.map_or_else(|| "no time".to_owned(), |period| period.to_string())
+            covered.map_or_else(|| "no time".to_owned(), |period| period.to_string()),
+            if chosen.is_all {
+                String::new()
+            } else {
+                format!("; {}", cut(options.asked.limit))
+            }
         );
     }
     if let Some(file) = &options.plot {

@@ -136,7 +136,7 @@ fn advice(report: &Report) -> Vec<String> {
     ];
     if found(&made_again).is_some() {
         advice.push(
-            "fields, counts, domains, cubes, sums and tiles are made again by: fluxglobe recompute --product PRODUCT --verify; what an attached product refers to, where its store has changed, by: fluxglobe attach --refresh PRODUCT, and where it has moved, by: fluxglobe attach URL --replace"
+            "fields, counts, domains, cubes, sums and tiles are made again by: fluxglobe recompute --product PRODUCT --verify; what an attached product refers to, where its store has changed, by: fluxglobe attach --refresh PRODUCT, and where it has moved, by: fluxglobe attach URL --variable NAME --product PRODUCT --replace"
                 .to_owned(),
         );
     }

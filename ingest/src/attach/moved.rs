@@ -24,11 +24,33 @@ pub(super) async fn gone(attachment: &Attachment) -> Option<ForeignError> {
 
 /// The words that attach the same of another store, each with a space before it.
 fn words(attachment: &Attachment) -> String {
-    let array = format!(" --variable {}", attachment.array);
+    let array = format!(" --variable {}", quoted(&attachment.array));
     let Ok(reading) = Reading::of(attachment) else {
         return array;
     };
     let profile = reading.profile.as_ref();
-    let array = profile.map_or(array, |name| format!(" --profile {name}"));
+    let array = profile.map_or(array, |name| format!(" --profile {}", quoted(name)));
     array + &reading.index_words()
+}
+
+/// A word as a shell reads it: names of arrays are whatever others call them.
+fn quoted(word: &str) -> String {
+    let is_plain = |byte: u8| byte.is_ascii_alphanumeric() || b"_./-".contains(&byte);
+    if word.bytes().all(is_plain) {
+        word.to_owned()
+    } else {
+        format!("'{}'", word.replace('\'', r"'\''"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_that_a_shell_would_read_otherwise_is_quoted() {
+        assert_eq!(quoted("group/sst_4"), "group/sst_4");
+        assert_eq!(quoted("sst; rm -r x"), "'sst; rm -r x'");
+        assert_eq!(quoted("it's"), r"'it'\''s'");
+    }
 }

@@ -12,7 +12,7 @@ use storage::attached::Attachment;
 use storage::{StorageError, Store, domain, fields, manifests};
 
 use super::Attached;
-use super::kept::kept;
+use super::kept::{Kept, kept};
 use super::reading::Reading;
 use super::steps::{self, Put};
 use super::survey::Survey;
@@ -20,6 +20,23 @@ use crate::commit;
 use crate::error::{IngestError, Rejection, Stop};
 use crate::pipeline::grids::{left_out, without_values};
 use crate::plan::PlannedStep;
+
+/// What the newest version keeps of a survey, once it is known that the product may become it.
+async fn kept_of_newest(
+    store: &Store,
+    survey: &Survey,
+    replace: bool,
+) -> Result<BTreeMap<u64, Kept>, Stop> {
+    let plan = &survey.plan;
+    // Before a value is read: what would be refused at the end is refused now.
+    let only = (!replace).then_some(&survey.attachment);
+    let Some(newest) = newest(store, &plan.target.product, only).await? else {
+        return Ok(BTreeMap::new());
+    };
+    let is_of = (plan.target.quantity, plan.target.synthetic);
+    check_fits(&newest, plan.mapping.grid, is_of)?;
+    kept(store, &newest, survey).await
+}
 
 /// Reads all steps and publishes them as the next version; of a product that is attached to something else only if it may `replace`
 /// that.
@@ -30,20 +47,7 @@ pub(super) async fn publish(
     told: &(dyn Fn(usize, usize) + Send + Sync),
 ) -> Result<Attached, Stop> {
     let product = survey.plan.target.product.clone();
-    // Before a value is read: what would be refused at the end is refused now.
-    let only = (!replace).then_some(&survey.attachment);
-    let kept = match newest(store, &product, only).await? {
-        Some(newest) => {
-            let target = &survey.plan.target;
-            check_fits(
-                &newest,
-                survey.plan.mapping.grid,
-                (target.quantity, target.synthetic),
-            )?;
-            kept(store, &newest, &survey).await?
-        }
-        None => BTreeMap::new(),
-    };
+    let kept = kept_of_newest(store, &survey, replace).await?;
     let Survey {
         mut plan,
         attachment,

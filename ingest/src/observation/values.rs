@@ -13,7 +13,8 @@ pub(crate) const MAX_VALUES: u64 = 1 << 24;
 /// All values of a variable, unpacked, NaN where there is none, in the order of its dimensions.
 pub(super) async fn read(session: &mut Session, variable: &Variable) -> Result<Vec<f64>, Stop> {
     let stored = read_stored(session, variable).await?;
-    let packing = Packing::of(variable).checked(variable)?;
+    let packing = Packing::of(variable).with_any_range_text();
+    let packing = packing.checked(variable)?;
     Ok(stored.into_iter().map(|v| packing.value(v)).collect())
 }
 

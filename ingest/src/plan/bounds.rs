@@ -94,7 +94,8 @@ async fn dates(
     let parts = vec![Part::All; lens.len()];
     let unit = stamps::unit(planning, time, None, None)?;
     // No fill value: in a store of Zarr 2 it may be the first instant.
-    let Packing { scale, offset, .. } = Packing::of(variable).checked(variable)?;
+    let packing = Packing::of(variable).with_any_range_text();
+    let Packing { scale, offset, .. } = packing.checked(variable)?;
     let numbers = planning.values.read(bounds, &parts, count * 2).await?;
     let date = |number: f64| {
         let date = unit.date(number * scale + offset);

@@ -165,7 +165,9 @@ pub(crate) async fn plan(
         method::check(variable, meaning.quantity, time.as_deref())?;
         written::check(description, variable, meaning.quantity)?;
         let told = written::climatology(description, variable);
-        told.iter().for_each(|told| planning.assume(told));
+        if let Some(told) = told {
+            planning.assume(told);
+        }
     }
     if matches!(meaning.quantity, Quantity::Open(_)) && open::stated_unit(variable).is_none() {
         planning.assume(format!(
@@ -299,10 +301,21 @@ impl<'a> Planning<'a> {
             return Err(Rejection::new(RejectReason::Grid, name, detail).into());
         }
         let parts = vec![Part::All; variable.dimensions.len()];
-        let packing = Packing::of(variable).checked(variable)?;
+        let packing = Packing::of(variable).with_any_range_text();
+        let packing = packing.checked(variable)?;
         let stored = self.values.read(name, &parts, count).await?;
-        let numbers = stored.into_iter().map(|v| packing.value(v)).collect();
-        Ok(coordinate::turned(variable, numbers))
+        let numbers: Vec<f64> = stored.into_iter().map(|v| packing.value(v)).collect();
+        let first = numbers.first().copied();
+        let turned = coordinate::turned(variable, numbers);
+        if let (Some(first), Some(to)) = (first, turned.first())
+            && coordinate::is_turned(variable)
+        {
+            let units = variable.attributes.text("units").unwrap_or_default();
+            self.assume(format!(
+                "{name}: is in {units}; its numbers are turned, so that its first, {first}, is {to} northwards or eastwards"
+            ));
+        }
+        Ok(turned)
     }
 
     /// The time axis, or a scalar time beside the axes.

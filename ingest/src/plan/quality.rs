@@ -79,7 +79,7 @@ pub(super) fn plan(
     Ok(Some(Quality {
         variable: name.clone(),
         axes: layer_axes(variable, axes, layer)?,
-        packing: Packing::of(layer).checked(layer)?,
+        packing: Packing::of(layer).with_any_range_text().checked(layer)?,
         levels: rules.at_least.or(rules.at_most).map(|_stated| {
             let low = rules.at_least.unwrap_or(f64::NEG_INFINITY);
             (low, rules.at_most.unwrap_or(f64::INFINITY))

@@ -366,7 +366,11 @@ async fn longitudes_in_degrees_west_lie_in_the_west() {
         file.write(&place.path("a.nc"));
         let outcome = place.land(&[place.path("a.nc")]).await.remove(0);
         let told = assumed(&outcome);
-        assert!(told.iter().all(|line| !line.starts_with('l')), "{told:?}");
+        for (name, units) in [("lon", "degrees_west"), ("lat", "degrees_south")] {
+            let start = format!("{name}: is in {units}; its numbers are turned");
+            let is_told = |line: &String| line.starts_with(&start);
+            assert!(told.iter().any(is_told), "{told:?}");
+        }
         let Outcome::Landed { manifest, .. } = &outcome else {
             panic!("{outcome}")
         };
@@ -374,6 +378,15 @@ async fn longitudes_in_degrees_west_lie_in_the_west() {
         assert_eq!([grid.north_deg, grid.west_deg], [-35.0, -105.0]);
         assert_eq!((grid.rows, grid.cols), (4, 8));
     }
+}
+
+/// Of places and times nothing is left out by a range, whatever its text.
+#[tokio::test]
+async fn a_valid_range_of_an_axis_that_is_no_numbers_is_passed_over() {
+    let file = MadeFile::sst(2)
+        .but("lat", |v| v.text("valid_range", "-90.f 90.f"))
+        .but("time", |v| v.text("valid_min", "1982-01-01"));
+    land(&file).await;
 }
 
 /// A Gaussian grid is evened out, by how much is told, and what is farther from even is refused.

@@ -87,7 +87,7 @@ fn of_units(variable: &Variable) -> Option<(Role, bool)> {
         "degrees_east" | "degree_east" | "degrees_e" | "degree_e" | "degreese" | "degreee" => {
             Some((Role::Longitude, false))
         }
-        "degrees_south" | "degree_south" => Some((Role::Latitude, true)),
+        "degrees_south" | "degree_south" | "degrees_s" | "degree_s" => Some((Role::Latitude, true)),
         "degrees_west" | "degree_west" | "degrees_w" | "degree_w" | "degreesw" | "degreew" => {
             Some((Role::Longitude, true))
         }
@@ -95,13 +95,18 @@ fn of_units(variable: &Variable) -> Option<(Role, bool)> {
     }
 }
 
-/// Numbers of a coordinate, northwards and eastwards: in `degrees_west` (UDUNITS: -1 degree east) they count the other way.
+/// Do numbers of a coordinate count the other way than northwards and eastwards, as in `degrees_west` (UDUNITS: -1 degree east)?
+pub(crate) fn is_turned(coordinate: &Variable) -> bool {
+    matches!(of_units(coordinate), Some((_, true)))
+}
+
+/// Numbers of a coordinate, northwards and eastwards.
 pub(crate) fn turned(coordinate: &Variable, numbers: Vec<f64>) -> Vec<f64> {
-    match of_units(coordinate) {
-        // Nothing has no sign.
-        Some((_, true)) => numbers.into_iter().map(|number| 0.0 - number).collect(),
-        _ => numbers,
+    if !is_turned(coordinate) {
+        return numbers;
     }
+    // Nothing has no sign.
+    numbers.into_iter().map(|number| 0.0 - number).collect()
 }
 
 /// The axes of a variable, slowest first.

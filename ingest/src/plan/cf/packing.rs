@@ -175,6 +175,13 @@ impl Packing {
         Ok(self)
     }
 
+    /// The same where a valid range that is a text and none counts for nothing: of places, times, bounds and flags, which no such range
+    /// leaves out.
+    pub(crate) fn with_any_range_text(mut self) -> Self {
+        self.unread = None;
+        self
+    }
+
     /// Only these values (unpacked, in the file's unit) are valid, whatever the file says.
     pub(crate) fn with_valid_values(mut self, low: f64, high: f64) -> Self {
         self.valid_stored = ANY;
