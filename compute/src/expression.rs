@@ -260,9 +260,10 @@ fn unknown_name(error: &DataFusionError, text: &str, inputs: &[(String, Unit)]) 
 
 /// What is wrong with an input that is called as a word of SQL (`any`), if one is.
 fn word_of_sql(inputs: &[(String, Unit)], names: &DFSchema) -> Option<String> {
+    let read = |text: &str| STATE.create_logical_expr(text, names);
+    // Some are words behind an operator alone (`2 * any`).
     let is_column = |name: &str| {
-        let read = STATE.create_logical_expr(name, names);
-        matches!(read, Ok(Expr::Column(_)))
+        matches!(read(name), Ok(Expr::Column(_))) && read(&format!("1 * {name}")).is_ok()
     };
     let is_word = |name: &str| name.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'_');
     let mut names = inputs.iter().map(|(name, _unit)| name.as_str());
