@@ -89,7 +89,7 @@ fn what_is_asked_for_is_there_and_nothing_else() {
     let text = serde_json::to_string(&date).unwrap();
     assert_eq!(
         text,
-        r#"{"version":4,"date":{"shown":"15 July 2000","note":"monthly means"}}"#
+        r#"{"version":5,"date":{"shown":"15 July 2000","note":"monthly means"}}"#
     );
     let plain = PictureRequest {
         mode: Mode::Map,
