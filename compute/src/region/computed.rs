@@ -12,8 +12,10 @@ use storage::weights::SharedAreas;
 use super::cut::bounds_deg;
 use super::line_cover::lengths_m;
 use super::place_cover;
+use super::shares::Shares;
 use super::weights::{Surface, shared_of};
 use crate::ComputeError;
+use crate::awaited::Awaited;
 
 /// What such a text begins with; addresses of stored weights do not.
 const MARK: &str = "computed:";
@@ -74,26 +76,39 @@ impl ComputedWeights {
         Err(ComputeError::Region { reason })
     }
 
-    /// Areas of all of a region, m², by chunk, where those of its sea come of shares that are read band by band; none if this is
-    /// no region of such.
-    pub(crate) fn to_weigh(&self) -> Result<Option<Vec<(u32, SharedAreas)>>, ComputeError> {
-        let (Geometry::Region(region), Some(_)) = (&self.geometry, self.surface.shares()) else {
-            return Ok(None);
-        };
-        self.check_size()?;
-        let all = Surface::All;
-        shared_of(&self.grid, region, self.earth, &all, None).map(Some)
+    /// The shares of sea that areas of a region are weighed by; none if this is no region of such.
+    pub(crate) fn weighed_by(&self) -> Option<&Shares> {
+        match &self.geometry {
+            Geometry::Region(_) => self.surface.shares(),
+            Geometry::Line(_) | Geometry::Point { .. } => None,
+        }
+    }
+
+    /// The same with shares that are read band by band, which areas of all of a region are to be weighed by: without them.
+    pub(crate) fn to_weigh(
+        &self,
+        awaited: &Awaited,
+    ) -> Result<Vec<(u32, SharedAreas)>, ComputeError> {
+        match (&self.geometry, self.weighed_by()) {
+            (Geometry::Region(region), Some(_shares)) => {
+                self.check_size()?;
+                shared_of(&self.grid, region, self.earth, &Surface::All, None, awaited)
+            }
+            _ => self.chunks(None, awaited),
+        }
     }
 
     /// Areas of a region's share of every cell, m², lengths of a line's, m, or shares of a place, by chunk; `shares` is `[row, col]`, where the surface needs them.
     pub(crate) fn chunks(
         &self,
         shares: Option<&[f32]>,
+        awaited: &Awaited,
     ) -> Result<Vec<(u32, SharedAreas)>, ComputeError> {
         self.check_size()?;
         match &self.geometry {
             Geometry::Region(region) => {
-                shared_of(&self.grid, region, self.earth, &self.surface, shares)
+                let (grid, surface) = (&self.grid, &self.surface);
+                shared_of(grid, region, self.earth, surface, shares, awaited)
             }
             Geometry::Line(line) => lengths_m(&self.grid, line, self.earth).map(shared),
             Geometry::Point { place, sampling } => {
@@ -326,7 +341,8 @@ mod tests {
                 cells_in_bounds(&asked(60, region).grid, &region.parse().unwrap()),
                 cells
             );
-            let refused = asked(60, region).chunks(None).unwrap_err().to_string();
+            let refused = asked(60, region).chunks(None, &Awaited::always());
+            let refused = refused.unwrap_err().to_string();
             assert!(refused.contains("fluxglobe budget"), "{refused}");
         }
         let polygon = "POLYGON((10 10,20 10,20 20,10 10))";
