@@ -153,8 +153,13 @@ impl Objects {
         &self,
         address: &str,
     ) -> Result<Arc<RegionWeights>, DataFusionError> {
-        if let Some(question) = ComputedWeights::of_text(address).map_err(external)? {
-            let name = ComputedWeights::name(address);
+        let name = ComputedWeights::name(address);
+        // The question of a region of very many corners is long: what is held is found without reading it.
+        if let Some(held) = name.as_deref().and_then(|name| self.weights.held(name)) {
+            return Ok(held);
+        }
+        let question = ComputedWeights::of_text(address).map_err(external)?;
+        if let (Some(name), Some(question)) = (name, question) {
             // Held until there is an answer: it is what keeps the work alive.
             let work = self.weighing.join(&name);
             return self

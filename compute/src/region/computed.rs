@@ -54,9 +54,10 @@ impl ComputedWeights {
             .map(Some)
     }
 
-    /// What the answer is remembered by.
-    pub(crate) fn name(text: &str) -> String {
-        format!("{MARK}{}", Digest::of(text.as_bytes()))
+    /// What the answer to a text is remembered by; none if it is an address.
+    pub(crate) fn name(text: &str) -> Option<String> {
+        let is_question = text.starts_with(MARK);
+        is_question.then(|| format!("{MARK}{}", Digest::of(text.as_bytes())))
     }
 
     /// # Errors
@@ -308,6 +309,7 @@ mod tests {
         for region in ["global", "-0.1,0.2,170.3,0.30000000000000004", holed] {
             let question = asked(7, region);
             let text = question.text();
+            assert!(ComputedWeights::name(&text).is_some());
             assert_eq!(ComputedWeights::of_text(&text).unwrap(), Some(question));
         }
         let line = Geometry::Line(
@@ -328,6 +330,7 @@ mod tests {
             assert_eq!(ComputedWeights::of_text(&text).unwrap(), Some(question));
         }
         assert_eq!(ComputedWeights::of_text("file:///weights/a").unwrap(), None);
+        assert_eq!(ComputedWeights::name("file:///weights/a"), None);
         assert!(ComputedWeights::of_text("computed:{}").is_err());
     }
 

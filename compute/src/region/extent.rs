@@ -145,7 +145,10 @@ fn wide_edge(polygons: &[Polygon]) -> Option<String> {
     let edges = polygons
         .iter()
         .flat_map(|polygon| std::iter::once(&polygon.outer).chain(&polygon.holes))
-        .flat_map(|ring| Ring::new(ring.clone()).edges().collect::<Vec<_>>());
+        .flat_map(|ring| {
+            let next = ring.iter().cycle().skip(1);
+            ring.iter().zip(next).map(|(from, to)| [*from, *to])
+        });
     let [from, to] = edges
         .filter(|edge| width_deg(edge) > WIDE_EDGE_DEG)
         // Edges along a parallel from 180 to -180 are how maps of the whole world end.
