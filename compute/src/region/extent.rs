@@ -90,7 +90,7 @@ pub(crate) fn extent_while(
 ) -> Result<Extent, ComputeError> {
     let rings = rings_while(region, awaited)?;
     awaited.check()?;
-    let of_sea = sea(&rings)
+    let of_sea = sea(&rings)?
         .iter()
         .map(|ring| signed_area_m2(ring, earth))
         .sum();

@@ -17,7 +17,7 @@ use crate::awaited::Awaited;
 /// no edge, the rings are taken as they were written, bit for bit.
 ///
 /// # Errors
-/// `NotAwaited`, asked before each overlay.
+/// `Region` where edges are too many and too long; `NotAwaited`, asked before each overlay.
 pub(super) fn united(polygons: &[Checked], awaited: &Awaited) -> Result<Vec<Ring>, ComputeError> {
     let mut rings = vec![];
     for group in groups(polygons) {
@@ -86,13 +86,13 @@ fn overlaid(
             |rings: &[Vec<[f64; 2]>]| rings.iter().map(|ring| lattice.contour(ring)).collect();
         let (outers, holes): (Vec<_>, Vec<_>) =
             (contours(&polygon.outers), contours(&polygon.holes));
-        shapes.extend(difference(&outers, &holes));
+        shapes.extend(difference(&outers, &holes)?);
         given.extend(outers.iter().chain(&holes).map(straightened));
     }
     awaited.check()?;
     if polygons.len() > 1 {
         let contours: Vec<_> = shapes.into_iter().flatten().collect();
-        shapes = difference(&contours, &[]);
+        shapes = difference(&contours, &[])?;
     }
     Ok(match as_written {
         Some(polygons) if edges(given.iter()) == edges(shapes.iter().flatten()) => {

@@ -182,7 +182,7 @@ pub(crate) fn shared_of(
         _ if *surface == Surface::Ocean => {
             let rings = rings_while(region, awaited)?;
             awaited.check()?;
-            return ring_chunks(grid, &sea(&rings), earth, awaited);
+            return ring_chunks(grid, &sea(&rings)?, earth, awaited);
         }
         Region::Polygons(_) => {
             let rings = rings_while(region, awaited)?;
