@@ -20,6 +20,8 @@ const MOST_UNCUT: usize = 16_000;
 const MOST_PIECES: f64 = 16e6;
 /// Most pairs of edges that are looked at one by one: some ten seconds.
 const MOST_PAIRS: f64 = 1e10;
+/// Edges of which every pair is looked at, to know of how many of all that would be.
+const SAMPLE: usize = 8192;
 /// Steps of the lattice that take as long as it takes to see whether two edges cross.
 const STEPS_A_PAIR: f64 = 4.0;
 
@@ -101,7 +103,7 @@ pub(super) fn difference(
 /// Of very many edges it (4.5.2) cuts each at lines of longitude, and goes to the latitude of a cut by steps of the lattice, from a place that
 /// is the further off the longer the edge is: of one across the world up to 2²⁷ steps a cut, which together take seconds for each such edge.
 /// Where that is more work than to hold each edge against those that it meets in longitude, edges are taken as they are. So they are where they
-/// are cut into very many pieces: of a million edges across the world these would take 40 GB.
+/// are cut into very many pieces (of a million edges across the world these would take 40 GB), and where very many lie between two cuts.
 ///
 /// # Errors
 /// `Region` where neither can be done.
@@ -118,8 +120,9 @@ fn solver(contours: &[&[IntContour]]) -> Result<Solver, ComputeError> {
         [west.min(from.x), east.max(from.x)]
     });
     let all_wide = f64::from(ends[0].abs_diff(ends[1])).max(1.0);
-    // It has so many parts of all longitudes at most.
+    // It has so many parts of all longitudes at most, and half of them at least.
     let parts = f64::from(count.ilog2() / 2 + 1).exp2();
+    let looks = looks(edges(), count, 2.0 * all_wide / parts);
     let count = count as f64;
     let (mut steps, mut pairs, mut pieces) = (0.0, 0.0, 0.0);
     for (from, to) in edges() {
@@ -128,17 +131,62 @@ fn solver(contours: &[&[IntContour]]) -> Result<Solver, ComputeError> {
         pairs += share * count;
         pieces += share * parts + 1.0;
     }
-    if steps <= STEPS_A_PAIR * pairs && pieces <= MOST_PIECES {
+    let is_cut = steps <= STEPS_A_PAIR * pairs && pieces <= MOST_PIECES;
+    if is_cut && looks.cut <= MOST_PAIRS {
         return Ok(Solver::default());
     }
-    if pairs > MOST_PAIRS {
+    if looks.uncut > MOST_PAIRS {
         let reason = format!(
-            "its {count} edges, and those of land in it, are so long that {pairs:.0} pairs of them lie in the same longitudes, and at most \
-             {MOST_PAIRS:.0} are looked at; give fewer corners, or shorter edges"
+            "its {count} edges, and those of land in it, are so long that {:.1e} pairs of them lie in the same longitudes, and at most \
+             {MOST_PAIRS:.0e} are looked at; give fewer corners, or shorter edges",
+            looks.uncut
         );
         return Err(ComputeError::Region { reason });
     }
     Ok(Solver::LIST)
+}
+
+/// Pairs of edges that are looked at.
+struct Looks {
+    /// Of edges that are cut: those that meet in latitude and lie between the same two cuts, or nearly.
+    cut: f64,
+    /// Of edges as they are: those that meet in longitude.
+    uncut: f64,
+}
+
+/// How many pairs of some edges are looked at, by those of a sample; none where all pairs are not too many. Cuts are so far apart at most.
+fn looks<'a>(
+    edges: impl Iterator<Item = (&'a IntPoint, &'a IntPoint)>,
+    count: usize,
+    apart: f64,
+) -> Looks {
+    let mut looks = Looks {
+        cut: 0.0,
+        uncut: 0.0,
+    };
+    if (count as f64).powi(2) / 2.0 <= MOST_PAIRS {
+        return looks;
+    }
+    // An odd step comes by each side of teeth that have an even number of them.
+    let step = count.div_ceil(SAMPLE) | 1;
+    let bounds = |(from, to): (&IntPoint, &IntPoint)| {
+        let lons = [from.x.min(to.x), from.x.max(to.x)].map(f64::from);
+        (lons, [from.y.min(to.y), from.y.max(to.y)])
+    };
+    let some: Vec<([f64; 2], [i32; 2])> = edges.step_by(step).map(bounds).collect();
+    let (mut cut, mut uncut) = (0_u64, 0_u64);
+    for (at, (lons, lats)) in some.iter().enumerate() {
+        for (other_lons, other_lats) in &some[at + 1..] {
+            let between = (lons[0] - other_lons[1]).max(other_lons[0] - lons[1]);
+            let meet_in_latitude = lats[0] <= other_lats[1] && other_lats[0] <= lats[1];
+            uncut += u64::from(between <= 0.0);
+            cut += u64::from(meet_in_latitude && between < apart);
+        }
+    }
+    let of_all = (count as f64 / some.len() as f64).powi(2);
+    looks.cut = cut as f64 * of_all;
+    looks.uncut = uncut as f64 * of_all;
+    looks
 }
 
 /// Most steps that the library takes to the latitude of one cut of an edge.
@@ -256,6 +304,11 @@ mod tests {
         let refused = strategy(&comb(200_000)).unwrap_err();
         assert!(matches!(refused, ComputeError::Region { .. }), "{refused}");
         assert!(refused.to_string().contains("fewer corners"), "{refused}");
+        // Upright teeth beside a long level edge, all of them between two cuts.
+        let mut teeth: Vec<[i32; 2]> = (0..300_000).map(|at| [at, at % 2 * half]).collect();
+        teeth.extend([[300_000, 0], [half, 0], [half, -1]]);
+        let teeth = [contour(&teeth)];
+        assert_eq!(strategy(&teeth).unwrap(), Strategy::List);
         // A coast of a million short ones has few.
         let coast: Vec<[i32; 2]> = (0..1_000_000).map(|at| [at, at % 2]).collect();
         let coast = [contour(&coast)];
