@@ -11,7 +11,7 @@ use contract::quantity::Quantity;
 use contract::time::Period;
 use storage::{StorageError, Store, manifests};
 
-use super::merge::{Taken, is_same_grid};
+use super::merge::{Taken, is_equal_grid, is_same_grid};
 use super::{ATTEMPTS, extent, race_lost};
 use crate::error::IngestError;
 use crate::limits::gates::Gates;
@@ -109,7 +109,8 @@ fn next(newest: &Manifest, readings: &[Reading]) -> Result<Manifest, String> {
         .filter(|step| !anew.contains(&file_of(step)))
         .cloned()
         .collect();
-    let quantity = quantity_of(newest, &taken, steps.is_empty())?;
+    let is_whole = steps.is_empty();
+    let quantity = quantity_of(newest, &taken, is_whole)?;
     let mut later = vec![];
     for reading in &taken {
         let held = &held[&file_of(&reading.steps[0])];
@@ -154,7 +155,11 @@ fn next(newest: &Manifest, readings: &[Reading]) -> Result<Manifest, String> {
         steps,
         ..newest.clone()
     };
-    if !is_same_grid(&first.grid, &newest.grid) {
+    // Files of one product may differ in the last digits of their axes: its grid is that of one of them.
+    let is_of_none = !taken
+        .iter()
+        .any(|reading| is_equal_grid(&reading.grid, &newest.grid));
+    if is_whole && is_of_none {
         next.grid = first.grid;
     }
     // Titles can differ from file to file: that of the last step is the product's, whatever part was read anew.

@@ -5,6 +5,7 @@ use contract::grid::{Grid, wrap_lon_deg};
 use serde::{Deserialize, Serialize};
 
 use super::coordinate::Role;
+use super::single;
 use crate::error::Rejection;
 
 /// How far a label may stand from its place on a regular axis, in cells. Labels in float32 stay well below; those of a Gaussian
@@ -60,7 +61,10 @@ impl Mapping {
         names: [&str; 2],
     ) -> Result<Self, Rejection> {
         let lat = regular(lat_deg, names[0])?;
-        let lon = regular(&unwrapped(lon_deg), names[1])?;
+        let places_deg = unwrapped(lon_deg);
+        let lon = regular(&places_deg, names[1])?;
+        let (lat, dlat) = meant(lat, (lat_deg, lat_deg), snapped_step(lat));
+        let (lon, dlon) = meant(lon, (lon_deg, &places_deg), closed_step(lon));
         if lat_deg.iter().any(|v| v.abs() > 90.0 + lat.step.abs()) {
             return Err(refused(
                 names[0],
@@ -68,7 +72,6 @@ impl Mapping {
             ));
         }
         let (north_shift, west_shift) = registration.shifts();
-        let (dlat, dlon) = (snapped_step(lat), closed_step(lon));
         let northernmost = if lat.step > 0.0 {
             lat.last()
         } else {
@@ -286,6 +289,24 @@ fn regular(labels: &[f64], name: &str) -> Result<Regular, Rejection> {
         return Err(refused(name, &detail));
     }
     Ok(Regular { first, step, count })
+}
+
+/// An axis and the width of its cells, degrees: as they are fitted and taken to be, or, of labels of single precision, as they were
+/// before these were rounded.
+fn meant(fitted: Regular, (labels, places): (&[f64], &[f64]), cell_deg: f64) -> (Regular, f64) {
+    let is_round = (cell_deg - fitted.step.abs()).abs() > 0.0;
+    let round_deg = is_round.then(|| cell_deg.copysign(fitted.step));
+    match single::meant(labels, places, fitted.step, round_deg) {
+        Some([first, step]) => {
+            let meant = Regular {
+                first,
+                step,
+                ..fitted
+            };
+            (meant, step.abs())
+        }
+        None => (fitted, cell_deg),
+    }
 }
 
 /// A step as the round fraction (1/60) or multiple (2.5) of a degree it was meant to be, if it is close to one.
@@ -523,6 +544,49 @@ mod tests {
             "{:?}",
             m.grid
         );
+    }
+
+    #[test]
+    fn labels_in_float32_whose_edges_are_no_halves_of_cells_give_edges_of_few_decimals() {
+        let float32 = |v: Vec<f64>| {
+            v.into_iter()
+                .map(|x| f64::from(x as f32))
+                .collect::<Vec<_>>()
+        };
+        let near = |grid: Grid, wanted: [f64; 4]| {
+            let own = [grid.north_deg, grid.west_deg, grid.dlat_deg, grid.dlon_deg];
+            let off = own.iter().zip(wanted).map(|(own, wanted)| own - wanted);
+            assert!(farthest(off) < 1e-12, "{grid:?} {wanted:?}");
+        };
+        // From the south and from the north, and steps that are no part of a degree by themselves.
+        let m = map(
+            &float32(labels(20.1, 0.25, 40)),
+            &float32(labels(120.1, 0.07, 100)),
+            Registration::Center,
+        );
+        near(m.unwrap().grid, [29.975, 120.065, 0.25, 0.07]);
+        let m = map(
+            &float32(labels(60.3, -0.25, 40)),
+            &float32(labels(200.1, 0.25, 40)),
+            Registration::NorthWest,
+        );
+        near(m.unwrap().grid, [60.3, -159.9, 0.25, 0.25]);
+        // Round the earth, from anywhere.
+        let m = map(
+            &float32(labels(-89.5, 1.0, 180)),
+            &float32(labels(0.1, 0.25, 1440)),
+            Registration::Center,
+        );
+        let grid = m.unwrap().grid;
+        assert!(grid.is_periodic());
+        near(grid, [90.0, -179.775, 1.0, 0.25]);
+        // Labels that are off by more than that stay where they are.
+        let mut lat = float32(labels(20.1, 0.25, 40));
+        lat[7] += 0.001;
+        let lon = float32(labels(120.1, 0.25, 100));
+        let m = map(&lat, &lon, Registration::Center).unwrap();
+        assert!((m.grid.south_deg() - (f64::from(20.1_f32) - 0.125)).abs() < 1e-12);
+        assert!((m.grid.west_deg - 119.975).abs() < 1e-12);
     }
 
     #[test]
