@@ -88,7 +88,10 @@ impl Rounded<'_> {
             [f64::NEG_INFINITY, f64::INFINITY],
             |[low, high], (index, (place, rounding_deg))| {
                 let first = place - step * index as f64;
-                [low.max(first - rounding_deg), high.min(first + rounding_deg)]
+                [
+                    low.max(first - rounding_deg),
+                    high.min(first + rounding_deg),
+                ]
             },
         );
         (low <= high).then_some([low, high])
