@@ -44,6 +44,14 @@ pub(crate) struct Mapping {
     pub(crate) file_cols: Vec<u32>,
 }
 
+/// Labels of an axis, degrees.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Labels<'a> {
+    pub(crate) deg: &'a [f64],
+    /// The width of the cell of one label alone, where bounds say it.
+    pub(crate) only_deg: Option<f64>,
+}
+
 /// A regular axis: first label, step (signed), count.
 #[derive(Debug, Clone, Copy)]
 struct Regular {
@@ -53,18 +61,19 @@ struct Regular {
 }
 
 impl Mapping {
-    /// The grid of two axes. `names` are those of the variables, for refusals.
+    /// The grid of two axes, latitude and longitude. `names` are those of the variables, for refusals.
     pub(crate) fn from_labels(
-        lat_deg: &[f64],
-        lon_deg: &[f64],
+        [lat, lon]: [Labels<'_>; 2],
         registration: Registration,
         names: [&str; 2],
     ) -> Result<Self, Rejection> {
-        let lat = regular(lat_deg, names[0])?;
-        let places_deg = unwrapped(lon_deg);
-        let lon = regular(&places_deg, names[1])?;
-        let (lat, dlat) = meant(lat, (lat_deg, lat_deg), snapped_step(lat));
-        let (lon, dlon) = meant(lon, (lon_deg, &places_deg), closed_step(lon));
+        let (lat_deg, lon_deg) = (lat.deg, unwrapped(lon.deg));
+        let fitted = [
+            regular(lat_deg, lat.only_deg, names[0])?,
+            regular(&lon_deg, lon.only_deg, names[1])?,
+        ];
+        let (lat, dlat) = meant(fitted[0], (lat_deg, lat_deg), snapped_step(fitted[0]));
+        let (lon, dlon) = meant(fitted[1], (lon.deg, &lon_deg), closed_step(fitted[1]));
         if lat_deg.iter().any(|v| v.abs() > 90.0 + lat.step.abs()) {
             return Err(refused(
                 names[0],
@@ -258,13 +267,12 @@ fn unwrapped(lon_deg: &[f64]) -> Vec<f64> {
     lon_deg.iter().map(step).collect()
 }
 
-fn regular(labels: &[f64], name: &str) -> Result<Regular, Rejection> {
-    let count = u32::try_from(labels.len()).ok().filter(|n| *n >= 2);
+/// `only_deg`: the width of the cell of one label alone, where it is known.
+fn regular(labels: &[f64], only_deg: Option<f64>, name: &str) -> Result<Regular, Rejection> {
+    let count = u32::try_from(labels.len()).ok().filter(|n| *n >= 1);
     let Some(count) = count else {
-        return Err(refused(
-            name,
-            "has fewer than two labels, between which the size of cells is found; state the grid in a profile",
-        ));
+        let detail = "has no labels, or too many; state the grid in a profile";
+        return Err(refused(name, detail));
     };
     if let Some(bad) = labels.iter().find(|v| !v.is_finite() || v.abs() > 1e4) {
         return Err(refused(
@@ -275,6 +283,11 @@ fn regular(labels: &[f64], name: &str) -> Result<Regular, Rejection> {
         ));
     }
     let first = labels[0];
+    if count == 1 {
+        let detail = "has one label and no bounds, so that nothing says how wide its cell is: give it two edges (bounds), or state the grid in a profile";
+        let step = only_deg.ok_or_else(|| refused(name, detail))?;
+        return Ok(Regular { first, step, count });
+    }
     let step = (labels[labels.len() - 1] - first) / f64::from(count - 1);
     let worst = labels
         .iter()
@@ -294,6 +307,10 @@ fn regular(labels: &[f64], name: &str) -> Result<Regular, Rejection> {
 /// An axis and the width of its cells, degrees: as they are fitted and taken to be, or, of labels of single precision, as they were
 /// before these were rounded.
 fn meant(fitted: Regular, (labels, places): (&[f64], &[f64]), cell_deg: f64) -> (Regular, f64) {
+    // The width of one cell is what its edges say.
+    if fitted.count == 1 {
+        return (fitted, fitted.step);
+    }
     let is_round = (cell_deg - fitted.step.abs()).abs() > 0.0;
     let round_deg = is_round.then(|| cell_deg.copysign(fitted.step));
     match single::meant(labels, places, fitted.step, round_deg) {
@@ -355,7 +372,11 @@ mod tests {
     }
 
     fn map(lat: &[f64], lon: &[f64], registration: Registration) -> Result<Mapping, Rejection> {
-        Mapping::from_labels(lat, lon, registration, ["lat", "lon"])
+        let labels = [lat, lon].map(|deg| Labels {
+            deg,
+            only_deg: None,
+        });
+        Mapping::from_labels(labels, registration, ["lat", "lon"])
     }
 
     const ONE_DEGREE: Grid = Grid {
@@ -621,6 +642,38 @@ mod tests {
         assert_eq!(
             (m.grid.cols, m.grid.west_deg, m.file_cols[0]),
             (360, -179.5, 181)
+        );
+    }
+
+    #[test]
+    fn one_label_is_a_row_or_a_column_where_the_width_of_its_cell_is_known() {
+        let lon = labels(0.5, 1.0, 360);
+        let only = |deg, only_deg| Labels { deg, only_deg };
+        let mapped = |lat: Labels<'_>, lon: Labels<'_>| {
+            Mapping::from_labels([lat, lon], Registration::Center, ["lat", "lon"])
+        };
+        let m = mapped(only(&[3.0], Some(4.0625)), only(&lon, None)).unwrap();
+        let grid = Grid {
+            rows: 1,
+            north_deg: 5.03125,
+            dlat_deg: 4.0625,
+            ..ONE_DEGREE
+        };
+        assert_eq!((m.grid, &m.file_rows[..]), (grid, &[0][..]));
+        // A mean over all longitudes.
+        let lat = labels(-89.5, 1.0, 180);
+        let m = mapped(only(&lat, None), only(&[0.0], Some(360.0))).unwrap();
+        let grid = Grid {
+            cols: 1,
+            dlon_deg: 360.0,
+            ..ONE_DEGREE
+        };
+        assert_eq!((m.grid, &m.file_cols[..]), (grid, &[0][..]));
+        assert!(m.grid.is_periodic());
+        let refused = mapped(only(&[2.0], None), only(&lon, None)).unwrap_err();
+        assert!(
+            refused.detail.contains("one label and no bounds"),
+            "{refused:?}"
         );
     }
 
