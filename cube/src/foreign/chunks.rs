@@ -165,10 +165,10 @@ fn missing(array: &ForeignArray, place: &str, absent: Absent) -> ForeignError {
         (_, None) => "is not there, and fill_value of its array (.zarray) is null, so that nothing tells what its cells hold: write it, or, if it is no data, give fill_value the number that stands for that".to_owned(),
         // What it is filled with is missing in version 2, where its attributes do not say otherwise.
         (_, Some(fill)) if array.is_zarr2 => format!(
-            "is not there, so that its cells would be the fill value {fill} (fill_value of .zarray), which is no missing value here, since _FillValue of its attributes, or a profile, names another: nothing tells whether it was never written; write it, or, if it is no data, make the two the same"
+            "is not there, so that its cells would be the fill value {fill} (fill_value of .zarray), which is no missing value here: _FillValue of its attributes, or a profile, names another. Nothing tells whether it was never written: write it, or, if it is no data, make the two one"
         ),
         (_, Some(fill)) => format!(
-            "is not there, so that its cells would be the fill value {fill}, which is no missing value here, since no _FillValue of its attributes names it: nothing tells whether it was never written; write it, or, if it is no data, say \"_FillValue\": {fill} in the attributes"
+            "is not there, so that its cells would be the fill value {fill}, which is no missing value here: no _FillValue of its attributes names it. Nothing tells whether it was never written: write it, or, if it is no data, say \"_FillValue\": {fill} in the attributes"
         ),
     };
     ForeignError::absent(format!("{} {place}", array.place), reason)
