@@ -4,6 +4,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use contract::digest::Digest;
+use contract::grid::Grid;
 use contract::manifest::{MANIFEST_SCHEMA, Manifest, Step};
 use contract::notice::{NoticeOrder, NoticeRun};
 use contract::product::ProductId;
@@ -155,12 +156,8 @@ fn next(newest: &Manifest, readings: &[Reading]) -> Result<Manifest, String> {
         steps,
         ..newest.clone()
     };
-    // Files of one product may differ in the last digits of their axes: its grid is that of one of them.
-    let is_of_none = !taken
-        .iter()
-        .any(|reading| is_equal_grid(&reading.grid, &newest.grid));
-    if is_whole && is_of_none {
-        next.grid = first.grid;
+    if is_whole {
+        next.grid = grid_of(newest, &taken);
     }
     // Titles can differ from file to file: that of the last step is the product's, whatever part was read anew.
     let last = next.steps.last().map(file_of);
@@ -169,6 +166,17 @@ fn next(newest: &Manifest, readings: &[Reading]) -> Result<Manifest, String> {
         next.source.clone_from(&last.source);
     }
     Ok(next)
+}
+
+/// The grid of a product of which all files were read anew: it stays as long as it is that of one of them, which may differ in the last
+/// digits of their axes.
+fn grid_of(newest: &Manifest, taken: &[&Reading]) -> Grid {
+    let is_there = |reading: &&Reading| is_equal_grid(&reading.grid, &newest.grid);
+    if taken.iter().any(is_there) {
+        newest.grid
+    } else {
+        taken[0].grid
+    }
 }
 
 /// What all files hold. Those of one product have one grid and one quantity: those that are read anew with those that are

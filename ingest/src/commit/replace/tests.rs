@@ -1,6 +1,5 @@
 //! Replacing by hand-made steps: other values, other months, other grids, files that others revised.
 
-use contract::grid::Grid;
 use contract::key::ObjectKey;
 use contract::manifest::MANIFEST_SCHEMA;
 use contract::quantity::Quantity;
