@@ -91,6 +91,8 @@ pub struct Grid {
 
 /// Slack for edges computed from rounded coordinates, in cells.
 const EDGE_SLACK_CELLS: f64 = 1e-3;
+/// A place closer to an edge than this is on it, degrees: edges are told with nine decimals.
+const ON_EDGE_DEG: f64 = 1e-9;
 
 impl Grid {
     /// Checks the invariants of a grid that came from outside.
@@ -98,7 +100,7 @@ impl Grid {
     /// # Errors
     /// Empty or too large (more than [`MAX_CELLS`]), not finite, past the poles, or wider than a full turn.
     pub fn validate(&self) -> Result<(), ContractError> {
-        let bad = |reason: &str| Err(ContractError::invalid("grid", &format!("{self:?}"), reason));
+        let bad = |reason: &str| Err(ContractError::invalid("grid", &self.text(), reason));
         let numbers = [self.north_deg, self.west_deg, self.dlat_deg, self.dlon_deg];
         if self.rows == 0
             || self.cols == 0
@@ -120,6 +122,16 @@ impl Grid {
             return bad("its western edge must lie in [-180, 180)");
         }
         Ok(())
+    }
+
+    /// What it is, for people; no more than it says, since it may be none.
+    fn text(&self) -> String {
+        let [height, width] = [self.dlat_deg, self.dlon_deg].map(rounded_deg);
+        let [north, west] = [self.north_deg, self.west_deg].map(rounded_deg);
+        format!(
+            "{} x {} cells of {height} x {width} degrees from {north} N {west} E",
+            self.rows, self.cols
+        )
     }
 
     /// Number of cells.
@@ -160,21 +172,41 @@ impl Grid {
         }
     }
 
-    /// The cell that holds a place: `(row, col)`; none outside the grid. Northern and western edges belong to a cell.
+    /// The cell that holds a place: `(row, col)`; none outside the grid. Northern and western edges belong to a cell, and the
+    /// southern and the eastern edge of the grid, beyond which there is no cell, to its last ones.
     pub fn cell_at(&self, place: LonLatDeg) -> Option<(u32, u32)> {
-        let row = ((self.north_deg - place.lat) / self.dlat_deg).floor();
-        let row = if place.lat <= -90.0 {
-            row.min(f64::from(self.rows) - 1.0)
+        let (rows, cols) = (f64::from(self.rows), f64::from(self.cols));
+        let row = (self.north_deg - place.lat) / self.dlat_deg;
+        // A grid that reaches a pole but for its rounding has it.
+        let slack_cells = if place.lat.abs() >= 90.0 {
+            EDGE_SLACK_CELLS
         } else {
-            row
+            ON_EDGE_DEG / self.dlat_deg
         };
-        let east = (place.lon - self.west_deg).rem_euclid(360.0);
-        let col = (east / self.dlon_deg).floor();
-        // Round the earth the last edge, which rounding makes of a place a hair west of the first, is the first.
-        let is_last_edge = self.is_periodic() && col >= f64::from(self.cols);
-        let col = if is_last_edge { 0.0 } else { col };
-        let inside = row >= 0.0 && row < f64::from(self.rows) && col < f64::from(self.cols);
-        inside.then_some((row as u32, col as u32))
+        if !(-slack_cells..=rows + slack_cells).contains(&row) {
+            return None;
+        }
+        let col = self.east_of_edge_deg(place.lon) / self.dlon_deg;
+        let col = if col >= cols && self.is_periodic() {
+            0.0 // round the earth the last edge is the first
+        } else if col <= cols + ON_EDGE_DEG / self.dlon_deg {
+            col
+        } else {
+            return None;
+        };
+        let (row, col) = (row.clamp(0.0, rows - 1.0), col.min(cols - 1.0));
+        Some((row as u32, col as u32))
+    }
+
+    /// How far east of the western edge a longitude is, degrees, from 0 to 360; 0 also a hair west of it, where rounding puts what
+    /// is on it.
+    pub fn east_of_edge_deg(&self, lon_deg: f64) -> f64 {
+        let east_deg = (lon_deg - self.west_deg).rem_euclid(360.0);
+        if east_deg > 360.0 - ON_EDGE_DEG {
+            0.0
+        } else {
+            east_deg
+        }
     }
 
     /// Area of one cell of `row`, m².
@@ -259,7 +291,60 @@ mod tests {
             cols: 720,
             ..quarter
         };
+        assert_eq!(half.cell_at(LonLatDeg { lon, lat: 0.1 }), Some((359, 0)));
+        let lon = -0.126;
         assert_eq!(half.cell_at(LonLatDeg { lon, lat: 0.1 }), None);
+    }
+
+    #[test]
+    fn all_edges_of_a_part_of_the_globe_are_inside_and_nothing_beyond_them() {
+        // In double precision its edges are some hairs off the tenths of a degree that are told of them.
+        let grid = Grid {
+            rows: 33,
+            cols: 57,
+            north_deg: 40.1,
+            west_deg: 120.3,
+            dlat_deg: 0.1,
+            dlon_deg: 0.1,
+        };
+        let [west, south, east, north] = grid.shown_bounds_deg();
+        let told = [west, south, east, north].map(|deg| deg.to_string());
+        assert_eq!(told, ["120.3", "36.8", "126", "40.1"]);
+        let at = |lon, lat| grid.cell_at(LonLatDeg { lon, lat });
+        assert_eq!(at(west, north), Some((0, 0)));
+        assert_eq!(at(east, south), Some((32, 56)));
+        assert_eq!(at(west, south), Some((32, 0)));
+        assert_eq!(at(east, north), Some((0, 56)));
+        // An edge within it belongs to the cell south or east of it.
+        assert_eq!(at(122.299_999_9, 38.100_000_1), Some((19, 19)));
+        assert_eq!(at(122.300_000_1, 38.099_999_9), Some((20, 20)));
+        for (lon, lat) in [
+            (west - 1e-6, 38.0),
+            (east + 1e-6, 38.0),
+            (123.0, south - 1e-6),
+            (123.0, north + 1e-6),
+        ] {
+            assert_eq!(at(lon, lat), None, "{lon} {lat}");
+        }
+    }
+
+    #[test]
+    fn a_pole_is_in_grids_that_reach_it_alone() {
+        let at = |grid: Grid, lat| grid.cell_at(LonLatDeg { lon: 0.5, lat });
+        let tropics = Grid {
+            rows: 10,
+            north_deg: 5.0,
+            ..ONE_DEGREE
+        };
+        assert_eq!([-90.0, 90.0].map(|lat| at(tropics, lat)), [None, None]);
+        // Labels of single precision may end a little before it.
+        let rounded = Grid {
+            north_deg: 90.0 - 1e-5,
+            dlat_deg: 1.0 - 1e-7,
+            ..ONE_DEGREE
+        };
+        let found = [-90.0, 90.0].map(|lat| at(rounded, lat).map(|(row, _)| row));
+        assert_eq!(found, [Some(179), Some(0)]);
     }
 
     #[test]
@@ -309,6 +394,9 @@ mod tests {
                 .all(|g| g.validate().is_err())
         );
         assert!(ONE_DEGREE.validate().is_ok());
+        let told = past_pole.validate().unwrap_err().to_string();
+        let words = "180 x 360 cells of 1 x 1 degrees from 90.5 N -180 E";
+        assert!(told.contains(words), "{told}");
     }
 
     proptest! {

@@ -310,15 +310,18 @@ fn turned(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::plan::cf::axis::Registration;
+    use crate::plan::cf::axis::{Labels, Registration};
 
     #[test]
     fn south_first_and_longitude_first_files_give_the_same_map() {
         // 2 x 4 cells; the value is 10 * (index of latitude from the north) + (index of longitude from -180).
         let lat = [-45.0, 45.0];
         let lon = [45.0, 135.0, 225.0, 315.0];
-        let mapping =
-            Mapping::from_labels(&lat, &lon, Registration::Center, ["lat", "lon"]).unwrap();
+        let labels = [&lat[..], &lon].map(|deg| Labels {
+            deg,
+            only_deg: None,
+        });
+        let mapping = Mapping::from_labels(labels, Registration::Center, ["lat", "lon"]).unwrap();
         let expected: Vec<f32> = vec![0.0, 1.0, 2.0, 3.0, 10.0, 11.0, 12.0, 13.0];
         let lat_first = [12.0, 13.0, 10.0, 11.0, 2.0, 3.0, 0.0, 1.0];
         let all = |strides, stored: &[f64]| turned(&mapping, 0..2, strides, stored, |v| v as f32);

@@ -18,6 +18,7 @@ mod held_pages;
 mod leftovers;
 mod location;
 mod newest;
+mod outage;
 mod read;
 mod retry_store;
 mod settings;
@@ -44,6 +45,7 @@ use self::checked::Checked;
 use self::held_pages::HeldPages;
 use self::location::Location;
 use self::newest::Newest;
+use self::outage::Outage;
 use self::shared_parts::SharedParts;
 use crate::StorageError;
 
@@ -75,6 +77,8 @@ pub struct Store {
     url: String,
     place: Place,
     retry_limits: RetryLimits,
+    /// Objects that wait until the store takes them.
+    outage: Arc<Outage>,
     checked: Arc<Checked>,
     /// Where requests are counted, if they are.
     traffic: Option<Arc<Traffic>>,
@@ -156,6 +160,7 @@ impl Store {
             url: "memory:///".to_owned(),
             place: Place::Memory,
             retry_limits: RetryLimits::default(),
+            outage: Arc::new(Outage::of("objects")),
             checked: Arc::default(),
             traffic: None,
             is_layered: false,
@@ -181,6 +186,7 @@ impl Store {
             url: format!("file://{}/", text.trim_end_matches('/')),
             place: Place::Folder(root),
             retry_limits: RetryLimits::default(),
+            outage: Arc::new(Outage::of("objects")),
             checked: Arc::default(),
             traffic: None,
             is_layered: false,
@@ -206,6 +212,7 @@ impl Store {
             url: format!("{root_url}{prefix}{slash}"),
             place,
             retry_limits,
+            outage: Arc::new(Outage::of("objects")),
             checked: Arc::default(),
             traffic: None,
             is_layered: false,

@@ -33,7 +33,7 @@ pub(crate) fn shares(grid: &Grid, place: LonLatDeg, sampling: Sampling) -> Vec<(
 /// goes all the way round has none along its parallels.
 fn around(grid: &Grid, place: LonLatDeg) -> Vec<((u32, u32), f64)> {
     let y = (grid.north_deg - place.lat) / grid.dlat_deg - 0.5;
-    let x = (place.lon - grid.west_deg).rem_euclid(360.0) / grid.dlon_deg - 0.5;
+    let x = grid.east_of_edge_deg(place.lon) / grid.dlon_deg - 0.5;
     let row = |at: f64| at.clamp(0.0, f64::from(grid.rows - 1)) as u32;
     let col = |at: f64| {
         let cols = f64::from(grid.cols);
@@ -115,5 +115,11 @@ mod tests {
         let edge = cells(&regional, 100.1, 0.5, Sampling::Bilinear);
         assert_eq!(edge, BTreeMap::from([((89, 0), 1.0)]));
         assert!(cells(&regional, 99.9, 0.5, Sampling::Bilinear).is_empty());
+        // Its eastern edge is of the last column, and what rounding puts a hair west of the western one of the first.
+        let edge = cells(&regional, 130.0, 0.5, Sampling::Bilinear);
+        assert_eq!(edge, BTreeMap::from([((89, 29), 1.0)]));
+        let edge = cells(&regional, 100.0 - 1e-12, 0.5, Sampling::Bilinear);
+        assert_eq!(edge, BTreeMap::from([((89, 0), 1.0)]));
+        assert!(cells(&regional, 130.1, 0.5, Sampling::Bilinear).is_empty());
     }
 }

@@ -162,9 +162,13 @@ fn missing(array: &ForeignArray, place: &str, absent: Absent) -> ForeignError {
         (Absent::RefusedOfCoordinate, _) => {
             "is not there, and a coordinate has a value everywhere: write it again".to_owned()
         }
-        (_, None) => "is not there, and its array defines no fill value: nothing tells whether it was never written; write it, or say _FillValue in the attributes".to_owned(),
+        (_, None) => "is not there, and fill_value of its array (.zarray) is null, so that nothing tells what its cells hold: write it, or, if it is no data, give fill_value the number that stands for that".to_owned(),
+        // What it is filled with is missing in version 2, where its attributes do not say otherwise.
+        (_, Some(fill)) if array.is_zarr2 => format!(
+            "is not there, so that its cells would be the fill value {fill} (fill_value of .zarray), which is no missing value here: _FillValue of its attributes, or a profile, names another. Nothing tells whether it was never written: write it, or, if it is no data, make the two one"
+        ),
         (_, Some(fill)) => format!(
-            "is not there, and it then stands for the fill value {fill}, which is no missing value here: nothing tells whether it was never written; write it, or say _FillValue in the attributes"
+            "is not there, so that its cells would be the fill value {fill}, which is no missing value here: no _FillValue of its attributes names it. Nothing tells whether it was never written: write it, or, if it is no data, say \"_FillValue\": {fill} in the attributes"
         ),
     };
     ForeignError::absent(format!("{} {place}", array.place), reason)

@@ -210,10 +210,16 @@ async fn next_version(
         if let Some(newest) = &newest {
             check_fits(newest, next.grid, (next.quantity, next.synthetic))?;
             let joined = newest.quantity.joined(quantity).unwrap_or(quantity);
-            if newest.steps == steps && joined.flags() == newest.quantity.flags() {
+            // It differs by the noise of its axes, or by what was not rounded when they were read before.
+            if commit::is_equal_grid(&newest.grid, &grid) {
+                grid = newest.grid;
+            }
+            if newest.steps == steps
+                && newest.grid == grid
+                && joined.flags() == newest.quantity.flags()
+            {
                 return Ok((newest.clone(), false));
             }
-            grid = newest.grid;
             // Of what was not read only the version before knows the range.
             if domain.is_none() {
                 quantity = joined;

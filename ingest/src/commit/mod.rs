@@ -28,7 +28,7 @@ pub(crate) use claim::{Claim, ClaimName, is_later_or_same};
 pub(crate) use extent::FIELDS_AT_ONCE;
 pub(crate) use extent::write as domain;
 pub(crate) use mend::mend;
-pub(crate) use merge::is_same_grid;
+pub(crate) use merge::{is_equal_grid, is_same_grid};
 pub(crate) use replace::replace;
 pub(crate) use unchanged::Unchanged;
 pub(crate) use unchanged::answer as answer_unchanged;

@@ -2,6 +2,7 @@
 
 use contract::time::Period;
 
+use super::pairs::Layout;
 use super::refused::refused;
 use super::{Planning, no_bounds, stamps};
 use crate::error::{Rejection, Stop};
@@ -86,23 +87,26 @@ async fn dates(
         return Ok(None);
     };
     let lens: Vec<u64> = variable.dimensions.iter().map(|d| d.len).collect();
-    // A scalar time has bounds of one dimension.
-    let is_pairs = lens == [count, 2] || (count == 1 && lens == [2]);
-    if !(variable.is_numeric() && is_pairs) {
-        return Err(refused(time, no_bounds(variable, INSTEAD)).into());
+    let layout = Layout::of(&lens, count).filter(|_| variable.is_numeric());
+    let Some(layout) = layout else {
+        return Err(refused(time, no_bounds(variable, count, INSTEAD)).into());
+    };
+    if let Some(told) = layout.told() {
+        planning.assume(format!("{time}: its bounds {bounds:?} are {told}"));
     }
     let parts = vec![Part::All; lens.len()];
     let unit = stamps::unit(planning, time, None, None)?;
     // No fill value: in a store of Zarr 2 it may be the first instant.
     let packing = Packing::of(variable).with_any_range_text();
     let Packing { scale, offset, .. } = packing.checked(variable)?;
-    let numbers = planning.values.read(bounds, &parts, count * 2).await?;
+    let number_count = layout.number_count(count);
+    let numbers = planning.values.read(bounds, &parts, number_count).await?;
     let date = |number: f64| {
         let date = unit.date(number * scale + offset);
         date.map_err(|e| refused(bounds, e))
     };
-    let pair = |pair: &[f64]| Ok([date(pair[0])?, date(pair[1])?]);
-    let pairs = numbers.chunks_exact(2).map(pair);
+    let pair = |[one, other]: [f64; 2]| Ok([date(one)?, date(other)?]);
+    let pairs = layout.pairs(&numbers).into_iter().map(pair);
     Ok(Some(pairs.collect::<Result<_, Rejection>>()?))
 }
 

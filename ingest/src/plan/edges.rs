@@ -1,8 +1,10 @@
-//! Where the cells of an axis are by its bounds (CF 7.1): nothing new where its labels are their middles, else these.
+//! Where the cells of an axis are by its bounds (CF 7.1): nothing new where its labels are their middles, else these; of one label
+//! alone nothing else says how wide its cell is.
 
 use contract::event::RejectReason;
 use contract::grid::wrap_lon_deg;
 
+use super::pairs::Layout;
 use super::{Planning, no_bounds};
 use crate::error::{Rejection, Stop};
 use crate::inspect::file::description::Part;
@@ -22,65 +24,131 @@ pub(super) enum Along {
     Longitude,
 }
 
+/// Where the cells of an axis are.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Cells {
+    /// Their middles, or what else its labels name.
+    pub(super) labels: Vec<f64>,
+    /// The width of the one cell of one label, degrees.
+    pub(super) only_deg: Option<f64>,
+}
+
+impl Cells {
+    /// Cells of which nothing is known but the labels.
+    pub(super) fn of(labels: Vec<f64>) -> Self {
+        Self {
+            labels,
+            only_deg: None,
+        }
+    }
+}
+
 /// The middles of the cells of an axis: its labels, unless its bounds say otherwise.
 ///
 /// # Errors
 /// Bounds that are there and cannot be read, or are no cells side by side as the labels are.
-pub(super) async fn middles(
+pub(super) async fn cells(
     planning: &mut Planning<'_>,
     (name, labels): (&str, Vec<f64>),
     along: Along,
-) -> Result<Vec<f64>, Stop> {
+) -> Result<Cells, Stop> {
     let bounds = planning.file.variable(name);
     let bounds = bounds.and_then(|axis| axis.attributes.text("bounds"));
     let Some(bounds) = bounds.map(str::to_owned) else {
-        return Ok(labels);
+        return Ok(Cells::of(labels));
     };
-    let count = labels.len() as u64;
-    let Some(held) = planning.bounds_of((name, &bounds), INSTEAD)? else {
+    let Some(edges) = read(planning, (name, labels.len() as u64), &bounds).await? else {
         planning.assume(format!(
             "{name}: names bounds {bounds:?}, which are not there; its labels are taken for the middles of cells"
         ));
-        return Ok(labels);
+        return Ok(Cells::of(labels));
+    };
+    let wrong = |reason: String| {
+        let detail = format!("{reason}; correct them, or state the grid in a profile");
+        Rejection::new(RejectReason::Grid, &bounds, detail)
+    };
+    let told = format!(
+        "{name}: its labels are not the middles of its cells, which lie where its bounds {bounds:?} say"
+    );
+    if let ([label], [pair]) = (&labels[..], &edges[..]) {
+        let (middle, width_deg) = only(*label, *pair, along).map_err(wrong)?;
+        if (middle - label).abs() > TOLERANCE_CELLS * width_deg {
+            planning.assume(told);
+        }
+        return Ok(Cells {
+            labels: vec![middle],
+            only_deg: Some(width_deg),
+        });
+    }
+    let Some(found) = otherwise(&labels, &edges, along).map_err(wrong)? else {
+        return Ok(Cells::of(labels));
+    };
+    planning.assume(told);
+    Ok(Cells::of(found))
+}
+
+/// Two edges for each of so many labels; none if the bounds are not there.
+async fn read(
+    planning: &mut Planning<'_>,
+    (name, count): (&str, u64),
+    bounds: &str,
+) -> Result<Option<Vec<[f64; 2]>>, Stop> {
+    let Some(held) = planning.bounds_of((name, bounds), INSTEAD)? else {
+        return Ok(None);
     };
     let lens: Vec<u64> = held.dimensions.iter().map(|own| own.len).collect();
-    let is_pairs = lens.ends_with(&[count, 2]) && !lens.contains(&0);
-    if !(held.is_numeric() && is_pairs) {
-        let detail = no_bounds(held, INSTEAD);
-        return Err(Rejection::new(RejectReason::Grid, name, detail).into());
-    }
     // Programs that put files one behind the other give bounds a time, as they do the values.
-    let more = lens.len() - 2;
+    let is_repeated = lens.ends_with(&[count, 2]) && !lens.contains(&0);
+    let (layout, more) = match Layout::of(&lens, count) {
+        Some(layout) => (Some(layout), 0),
+        None if is_repeated => (Some(Layout::Pairs), lens.len() - 2),
+        None => (None, 0),
+    };
+    let Some(layout) = layout.filter(|_| held.is_numeric()) else {
+        let detail = no_bounds(held, count, INSTEAD);
+        return Err(Rejection::new(RejectReason::Grid, name, detail).into());
+    };
     if more > 0 {
         planning.assume(format!(
             "{name}: its bounds {bounds:?} have more dimensions than it has; the first of each is taken"
         ));
     }
-    let parts = [vec![Part::At(0); more], vec![Part::All; 2]].concat();
+    if let Some(told) = layout.told() {
+        planning.assume(format!("{name}: its bounds {bounds:?} are {told}"));
+    }
+    let parts = [vec![Part::At(0); more], vec![Part::All; lens.len() - more]].concat();
     // What is valid is said of labels, and edges may lie beyond.
     let packing = Packing::of(held).with_valid_values(f64::NEG_INFINITY, f64::INFINITY);
-    let stored = planning.values.read(&bounds, &parts, count * 2);
-    let mut values: Vec<f64> = stored
-        .await?
-        .into_iter()
-        .map(|it| packing.value(it))
-        .collect();
+    let number_count = layout.number_count(count);
+    let stored = planning.values.read(bounds, &parts, number_count).await?;
+    let mut values: Vec<f64> = stored.into_iter().map(|it| packing.value(it)).collect();
     // Bounds are in the units of what they bound.
     if let Some(axis) = planning.file.variable(name) {
         values = coordinate::turned(axis, values);
     }
-    let (edges, _none) = values.as_chunks::<2>();
-    let found = otherwise(&labels, edges, along).map_err(|reason| {
-        let detail = format!("{reason}; correct them, or state the grid in a profile");
-        Rejection::new(RejectReason::Grid, &bounds, detail)
-    })?;
-    let Some(found) = found else {
-        return Ok(labels);
+    Ok(Some(layout.pairs(&values)))
+}
+
+/// Middle and width, degrees, of the one cell of one label.
+fn only(label: f64, [one, other]: [f64; 2], along: Along) -> Result<(f64, f64), String> {
+    let cell = |one: f64, other: f64| (f64::midpoint(one, other), (other - one).abs());
+    let holds = |(middle, width_deg): &(f64, f64)| {
+        *width_deg > 0.0
+            && width_deg.is_finite()
+            && (label - middle).abs() <= (0.5 + TOLERANCE_CELLS) * width_deg
     };
-    planning.assume(format!(
-        "{name}: its labels are not the middles of its cells, which lie where its bounds {bounds:?} say"
-    ));
-    Ok(found)
+    // Longitudes as they are written, or else a turn further on.
+    let written = Some(cell(one, other)).filter(holds);
+    let turned = match along {
+        Along::Latitude => None,
+        Along::Longitude => {
+            let near = |edge: f64| label + wrap_lon_deg(edge - label);
+            Some(cell(near(one), near(other))).filter(holds)
+        }
+    };
+    written.or(turned).ok_or_else(|| {
+        format!("has a cell from {one} to {other} at the label {label}, which is not in it")
+    })
 }
 
 /// The middles of cells by their edges, where they are not the labels.
@@ -97,7 +165,7 @@ fn otherwise(labels: &[f64], edges: &[[f64; 2]], along: Along) -> Result<Option<
             steps.sum::<f64>().abs() / gaps
         }
     };
-    if labels.len() < 2 || !(cell.is_finite() && cell > 0.0) {
+    if !(cell.is_finite() && cell > 0.0) {
         // Refused by their labels.
         return Ok(None);
     }
@@ -190,6 +258,29 @@ mod tests {
             Along::Longitude,
         );
         assert_eq!(found, Ok(Some(vec![355.0, 5.0, 15.0])));
+    }
+
+    #[test]
+    fn the_cell_of_one_label_is_what_its_bounds_say() {
+        let lat = |label, pair| only(label, pair, Along::Latitude);
+        let lon = |label, pair| only(label, pair, Along::Longitude);
+        assert_eq!(lat(0.0, [-5.0, 5.0]), Ok((0.0, 10.0)));
+        assert_eq!(lat(0.0, [5.0, -5.0]), Ok((0.0, 10.0)));
+        assert_eq!(lat(0.0, [0.0, 10.0]), Ok((5.0, 10.0)));
+        // All round the earth, and across the date line or Greenwich's meridian.
+        assert_eq!(lon(0.0, [-180.0, 180.0]), Ok((0.0, 360.0)));
+        assert_eq!(lon(180.0, [0.0, 360.0]), Ok((180.0, 360.0)));
+        assert_eq!(lon(180.0, [175.0, -175.0]), Ok((180.0, 10.0)));
+        assert_eq!(lon(0.0, [350.0, 10.0]), Ok((0.0, 20.0)));
+        for refused in [
+            lat(20.0, [-5.0, 5.0]),
+            lat(0.0, [0.0, 0.0]),
+            lat(0.0, [f64::NAN, 5.0]),
+            lat(0.0, [-5.0, f64::INFINITY]),
+            lon(90.0, [350.0, 10.0]),
+        ] {
+            assert!(refused.unwrap_err().contains("at the label"));
+        }
     }
 
     #[test]

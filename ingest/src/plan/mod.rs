@@ -10,6 +10,7 @@ mod edges;
 mod flags;
 pub(crate) mod method;
 mod model_calendar;
+mod pairs;
 mod place;
 pub(crate) mod profile;
 mod quality;
@@ -212,11 +213,12 @@ pub(crate) async fn plan(
     })
 }
 
-/// What is said of an axis whose bounds are there and are not two numbers a label. `instead` is what can be stated in a profile.
-fn no_bounds(bounds: &Variable, instead: &str) -> String {
+/// What is said of an axis of so many labels whose bounds are there and are not two numbers for each. `instead` is what can be stated
+/// in a profile.
+fn no_bounds(bounds: &Variable, count: u64, instead: &str) -> String {
     let lens: Vec<u64> = bounds.dimensions.iter().map(|own| own.len).collect();
     format!(
-        "names bounds {:?}, which are not two numbers for each of its labels but {} of the shape {lens:?}; write them otherwise, or state {instead} in a profile",
+        "names bounds {:?}, which are not two numbers for each of its labels but {} of the shape {lens:?}; write them as numbers of the shape [{count}, 2], or state {instead} in a profile",
         bounds.name,
         bounds.kind.name()
     )

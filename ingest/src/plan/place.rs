@@ -3,11 +3,11 @@
 use contract::event::RejectReason;
 
 use super::Planning;
-use super::edges::{self, Along};
+use super::edges::{self, Along, Cells};
 use crate::error::{Rejection, Stop};
 use crate::inspect::file::description::{Dimension, Variable};
 use crate::inspect::values::Values;
-use crate::plan::cf::axis::{Mapping, Registration};
+use crate::plan::cf::axis::{Labels, Mapping, Registration};
 use crate::plan::cf::coordinate::{self, Axis, Evidence, Role};
 use crate::plan::cf::corner;
 use crate::plan::cf::projection;
@@ -289,19 +289,23 @@ async fn read_mapping(
             check_evidence(planning, name, labels, most_deg)?;
         }
     }
-    let (lat_deg, lon_deg) = if rules.registration.is_none() {
+    let (lat, lon) = if rules.registration.is_none() {
         (
-            edges::middles(planning, (&names[0], lat_deg), Along::Latitude).await?,
-            edges::middles(planning, (&names[1], lon_deg), Along::Longitude).await?,
+            edges::cells(planning, (&names[0], lat_deg), Along::Latitude).await?,
+            edges::cells(planning, (&names[1], lon_deg), Along::Longitude).await?,
         )
     } else {
-        (lat_deg, lon_deg)
+        (Cells::of(lat_deg), Cells::of(lon_deg))
     };
-    let registration = registration(planning, rules, &names, [&lat_deg, &lon_deg]);
-    let mapping = Mapping::from_labels(&lat_deg, &lon_deg, registration, [&names[0], &names[1]])?;
+    let registration = registration(planning, rules, &names, [&lat.labels, &lon.labels]);
+    let labels = [&lat, &lon].map(|cells| Labels {
+        deg: &cells.labels,
+        only_deg: cells.only_deg,
+    });
+    let mapping = Mapping::from_labels(labels, registration, [&names[0], &names[1]])?;
     for (name, role, labels) in [
-        (&names[0], Role::Latitude, &lat_deg),
-        (&names[1], Role::Longitude, &lon_deg),
+        (&names[0], Role::Latitude, &lat.labels),
+        (&names[1], Role::Longitude, &lon.labels),
     ] {
         if let Some((off_deg, cells)) = mapping.moved(role, labels, registration) {
             let short = mapping

@@ -23,7 +23,9 @@ use crate::plan::profile::Profile;
 /// 8: places in degrees west and south are turned, bounds and the time coordinate that cannot be read are not taken for none, valid ranges
 ///    count that are written as text, packed bounds of times are unpacked, weeks are not counted from 1 January, differences of
 ///    temperatures and percentiles are not taken for the quantity, and notes tell of steps without any value and of climatologies.
-pub(crate) const DECODER: u32 = 8;
+/// 9: axes of single precision lie at the round numbers that they stand for, bounds of axes are read in every shape that has one
+///    meaning, and axes of one label whose bounds say how wide their cell is are read.
+pub(crate) const DECODER: u32 = 9;
 
 /// How a file was read.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]

@@ -430,7 +430,7 @@ fn object_store_path(key: &str) -> object_store::path::Path {
 /// What is done to a store, and what must be in the refusal.
 type Fault = (&'static str, fn(&Own), &'static [&'static str]);
 
-const FAULTS: [Fault; 12] = [
+const FAULTS: [Fault; 13] = [
     (
         "v2-plain.zarr",
         |own| {
@@ -456,7 +456,22 @@ const FAULTS: [Fault; 12] = [
             own.edit("sst/.zattrs", |it| it["_FillValue"] = json!(-999.0));
             std::fs::remove_file(own.path().join("sst/1.0.0")).unwrap();
         },
-        &["array sst chunk [1, 0, 0]", "is not there", "_FillValue"],
+        &[
+            "array sst chunk [1, 0, 0]: is not there",
+            "the fill value 300 (fill_value of .zarray)",
+            "_FillValue of its attributes, or a profile, names another",
+        ],
+    ),
+    (
+        "v2-plain.zarr",
+        |own| {
+            own.edit("sst/.zarray", |it| it["fill_value"] = json!(null));
+            std::fs::remove_file(own.path().join("sst/1.0.0")).unwrap();
+        },
+        &[
+            "array sst chunk [1, 0, 0]: is not there",
+            "fill_value of its array (.zarray) is null",
+        ],
     ),
     (
         "v3-gzip.zarr",
@@ -464,7 +479,11 @@ const FAULTS: [Fault; 12] = [
             own.edit("sst/zarr.json", |it| it["fill_value"] = json!(0.0));
             std::fs::remove_file(own.path().join("sst/c/0/2/0")).unwrap();
         },
-        &["array sst chunk [0, 2, 0]", "fill value 0"],
+        &[
+            "array sst chunk [0, 2, 0]",
+            "fill value 0, which is no missing value",
+            "say \"_FillValue\": 0 in the attributes",
+        ],
     ),
     (
         "v2-plain.zarr",

@@ -324,17 +324,37 @@ async fn labels_at_corners_with_bounds_land_where_these_say() {
 
 /// Bounds that are there say where cells are: what is no two numbers a cell is not taken for none.
 #[tokio::test]
-async fn bounds_of_another_shape_are_refused_but_for_a_time_before_the_rest() {
+async fn bounds_of_another_shape_are_read_where_it_has_one_meaning_and_refused_elsewhere() {
     let edges = [45.0, 90.0, 0.0, 45.0, -45.0, 0.0, -90.0, -45.0];
     let file = |dimensions: &[&'static str], numbers: Vec<f64>| {
-        MadeFile::sst(2)
+        let mut file = MadeFile::sst(2)
             .but("lat", |v| v.text("bounds", "lat_bnds"))
-            .with(Made::new("lat_bnds", dimensions, Values::Doubles(numbers)))
+            .with(Made::new("lat_bnds", dimensions, Values::Doubles(numbers)));
+        file.dimensions.extend([("edge", 5), ("one", 1)]);
+        file
     };
-    let turned = file(&["two", "lat"], edges.to_vec());
-    assert_refused(&turned, &["lat: ", "\"lat_bnds\"", "[2, 4]", "the grid"]).await;
+    // They say where cells are, and so is what is read of them.
+    let rows = [45.0, 0.0, -45.0, -90.0, 90.0, 45.0, 0.0, -45.0];
+    let between = [90.0, 45.0, 0.0, -45.0, -90.0];
+    let lying: [(&[&'static str], &[f64], &str); 3] = [
+        (&["two", "lat"], &rows, "two rows"),
+        (&["edge"], &between, "one number more than there are labels"),
+        (&["lat", "one", "two"], &edges, ""),
+    ];
+    for (dimensions, numbers, told) in lying {
+        let lines = assumed(&land(&file(dimensions, numbers.to_vec())).await);
+        let about: Vec<&String> = lines.iter().filter(|line| line.contains("bnds")).collect();
+        assert!(about.iter().all(|line| line.contains(told)), "{about:?}");
+        assert_eq!(about.len(), usize::from(!told.is_empty()), "{about:?}");
+        let moved: Vec<f64> = numbers.iter().map(|edge| edge / 4.0).collect();
+        let words = ["lat_bnds: ", "no cells side by side"];
+        assert_refused(&file(dimensions, moved), &words).await;
+    }
+    let plain = file(&["lat"], vec![0.0; 4]);
+    let words = ["lat: ", "\"lat_bnds\"", "[4]", "shape [4, 2]", "the grid"];
+    assert_refused(&plain, &words).await;
     let letters = Values::Bytes(vec![0; 4]);
-    let plain = turned.with(Made::new("lat_bnds", &["lat"], letters));
+    let plain = plain.with(Made::new("lat_bnds", &["lat"], letters));
     assert_refused(&plain, &["lat: ", "\"lat_bnds\"", "int8", "[4]"]).await;
     let repeated = file(&["time", "lat", "two"], edges.repeat(2));
     let told = assumed(&land(&repeated).await);
@@ -343,6 +363,88 @@ async fn bounds_of_another_shape_are_refused_but_for_a_time_before_the_rest() {
     // They are read: what are no cells of the labels is refused.
     let narrow = file(&["time", "lat", "two"], vec![1.0; 16]);
     assert_refused(&narrow, &["lat_bnds: ", "no cells side by side"]).await;
+}
+
+/// Of one latitude, or one longitude, its bounds alone say how wide the cell is.
+#[tokio::test]
+async fn one_row_or_one_column_lands_where_its_bounds_say_how_wide_it_is() {
+    let one = |name: &'static str, label: f64| {
+        let mut file = MadeFile::sst(2);
+        let axis = file.dimensions.iter_mut().find(|(own, _)| *own == name);
+        let before = std::mem::replace(&mut axis.unwrap().1, 1);
+        let file = file.numbers(name, &[label]);
+        file.but("sst", |v| Made {
+            values: Values::Floats(vec![20.0; 2 * 32 / before]),
+            ..v
+        })
+    };
+    let bounded = |name: &'static str, label: f64, held: &'static str, edges: [f64; 2]| {
+        one(name, label)
+            .but(name, |v| v.text("bounds", held))
+            .with(bounds(held, name, &[edges]))
+    };
+    for name in ["lat", "lon"] {
+        let start = format!("{name}: has one label and no bounds");
+        assert_refused(
+            &one(name, 0.0),
+            &[start.as_str(), "(bounds)", "in a profile"],
+        )
+        .await;
+    }
+    let beside = bounded("lat", 10.0, "lat_bnds", [-5.0, 5.0]);
+    let words = ["lat_bnds: ", "from -5 to 5 at the label 10"];
+    assert_refused(&beside, &words).await;
+    let grid = async |file: &MadeFile| {
+        let place = Place::new();
+        file.write(&place.path("a.nc"));
+        let outcome = place.land(&[place.path("a.nc")]).await.remove(0);
+        let Outcome::Landed { manifest, .. } = &outcome else {
+            panic!("{outcome}")
+        };
+        let manifest = place.newest(manifest.product.as_str()).await;
+        assert!(place.values(&manifest, 1).await.len() < 32);
+        manifest.grid
+    };
+    let row = grid(&bounded("lat", 0.0, "lat_bnds", [5.0, -5.0])).await;
+    assert_eq!((row.rows, row.cols), (1, 8));
+    assert_eq!(row.shown_bounds_deg(), [-180.0, -5.0, 180.0, 5.0]);
+    // A mean over all longitudes.
+    let column = grid(&bounded("lon", 0.0, "lon_bnds", [-180.0, 180.0])).await;
+    assert_eq!((column.rows, column.cols), (4, 1));
+    assert_eq!(column.shown_bounds_deg(), [-180.0, -90.0, 180.0, 90.0]);
+}
+
+/// Labels of single precision were taken as they are stored: a product that landed so goes on.
+#[tokio::test]
+async fn a_product_on_axes_that_were_not_rounded_takes_its_next_step() {
+    let stored: Vec<f32> = (0..8_u16)
+        .map(|col| (120.102 + 0.01 * f64::from(col)) as f32)
+        .collect();
+    // A hair more, in double precision, lies where it says.
+    let before = stored.iter().map(|lon| f64::from(*lon) + 1e-9).collect();
+    let file = |days: [f64; 2], lon: Values| {
+        let file = MadeFile::sst(2).numbers("time", &days);
+        file.but("lon", |v| Made { values: lon, ..v })
+    };
+    let land = async |place: &Place, file: MadeFile, name: &str| {
+        file.write(&place.path(name));
+        let outcome = place.land(&[place.path(name)]).await.remove(0);
+        let Outcome::Landed { manifest, .. } = &outcome else {
+            panic!("{outcome}")
+        };
+        place.newest(manifest.product.as_str()).await
+    };
+    let place = Place::new();
+    let first = land(&place, file([0.0, 1.0], Values::Doubles(before)), "a.nc").await;
+    let off_deg = first.grid.west_deg - 120.097;
+    assert!((1e-6..1e-5).contains(&off_deg.abs()), "{:?}", first.grid);
+    let next = file([2.0, 3.0], Values::Floats(stored));
+    let second = land(&place, next.clone(), "b.nc").await;
+    assert_eq!(second.product, first.product);
+    assert_eq!((second.steps.len(), second.grid), (4, first.grid));
+    let alone = land(&Place::new(), next, "b.nc").await;
+    let off_deg = alone.grid.west_deg - 120.097;
+    assert!(off_deg.abs() < 1e-12, "{:?}", alone.grid);
 }
 
 /// What counts westwards and southwards is turned, its bounds too.

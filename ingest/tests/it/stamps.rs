@@ -70,6 +70,40 @@ async fn bounds_say_it_whatever_the_stamps_are() {
     assert_eq!(assumptions, Vec::<String>::new());
 }
 
+#[tokio::test]
+async fn bounds_that_lie_otherwise_are_read_where_that_has_one_meaning() {
+    let file = |dimensions: &[&'static str], numbers: &[f64]| {
+        let numbers = Values::Doubles(numbers.to_vec());
+        let mut file = MadeFile::sst(3)
+            .numbers("time", &[4.0, 12.0, 20.0])
+            .but("time", |v| v.text("bounds", "edges"))
+            .with(Made::new("edges", dimensions, numbers));
+        file.dimensions.extend([("edge", 4), ("one", 1)]);
+        file
+    };
+    let wanted = [
+        period("2001-01-01", "2001-01-09"),
+        period("2001-01-09", "2001-01-17"),
+        period("2001-01-17", "2001-01-25"),
+    ];
+    let pairs = [0.0, 8.0, 8.0, 16.0, 16.0, 24.0];
+    let lying: [(&[&'static str], &[f64], bool); 4] = [
+        (&["time", "one", "two"], &pairs, false),
+        (&["one", "time", "two"], &pairs, false),
+        (&["two", "time"], &[0.0, 8.0, 16.0, 8.0, 16.0, 24.0], true),
+        (&["edge"], &[0.0, 8.0, 16.0, 24.0], true),
+    ];
+    for (dimensions, numbers, is_told) in lying {
+        let (periods, assumptions) = told(&file(dimensions, numbers), None).await;
+        assert_eq!(periods, wanted, "{dimensions:?}");
+        let about = assumptions.iter().filter(|line| line.contains("edges"));
+        assert_eq!(about.count(), usize::from(is_told), "{assumptions:?}");
+    }
+    let three = file(&["time"], &[0.0, 8.0, 16.0]);
+    let words = ["time: ", "\"edges\"", "[3]", "shape [3, 2]", "the time"];
+    assert_refused(&three, &words).await;
+}
+
 /// Packed in tenths, as their stamps are not.
 #[tokio::test]
 async fn bounds_that_are_packed_are_unpacked() {

@@ -7,6 +7,7 @@ use futures::stream::FuturesUnordered;
 use futures::{StreamExt as _, TryStreamExt as _};
 use object_store::{Error, MultipartUpload, ObjectStoreExt as _, PutMode, PutOptions, PutPayload};
 
+use super::outage::Waiting;
 use super::{
     MAX_OBJECT_BYTES, MAX_SPOOLED_BYTES, PART_BYTES, PARTS_AT_ONCE, Place, Store, failed, folder,
     hdfs, path,
@@ -62,33 +63,40 @@ impl Store {
             return Err(StorageError::damaged(key.as_str(), reason));
         }
         let mut pauses = self.retry_limits.backoff().pauses();
-        let mut is_told = false;
-        loop {
+        let mut waiting: Option<Waiting<'_>> = None;
+        let stored = loop {
             let error = match self.create(key, &content).await {
-                Ok(()) => return Ok(true),
+                Ok(()) => break Ok(true),
                 Err(error) => error,
             };
             if self.is_refusal(&error) {
                 return Err(self.refused(key, error));
             }
             match self.holds(key, &content).await? {
-                Some(true) => return Ok(false),
-                Some(false) => return self.put_beside(key, content).await,
+                Some(true) => break Ok(false),
+                Some(false) => break self.put_beside(key, content).await,
                 None => {}
             }
             let Some(pause) = pauses.next() else {
                 return Err(failed(key, error));
             };
-            if is_told {
+            if waiting.is_some() {
                 tracing::info!(%key, %error, "not there after a doubtful answer: sent again");
-            } else {
+            } else if waiting.insert(self.outage.wait()).is_first {
                 // Whoever waits for a command is to see why: the disk may be full.
                 let retries_s = self.retry_limits.retries.as_secs_f64();
                 tracing::warn!(%key, %error, "not stored: tried again for at most {retries_s} s");
-                is_told = true;
+            } else {
+                tracing::info!(%key, %error, "not stored either: tried again");
             }
             tokio::time::sleep(pause).await;
+        };
+        if stored.is_ok()
+            && let Some(waiting) = waiting
+        {
+            waiting.went_well();
         }
+        stored
     }
 
     /// What becomes of an object where other bytes are.

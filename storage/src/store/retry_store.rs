@@ -15,6 +15,7 @@ use object_store::{
 };
 use retry::Retryable as _;
 
+use super::outage::{Outage, Waiting};
 use super::settings::RetryLimits;
 use crate::error::may_pass;
 
@@ -36,6 +37,8 @@ struct Shared {
     retry_limits: RetryLimits,
     /// Gives an error of the client the kind that it has, where the client does not.
     classify: fn(Error) -> Error,
+    /// Requests that are tried again.
+    outage: Outage,
 }
 
 type Client = Arc<dyn ObjectStore>;
@@ -55,6 +58,7 @@ impl RetryStore {
                 connect,
                 retry_limits,
                 classify,
+                outage: Outage::of("requests"),
             }),
         })
     }
@@ -99,19 +103,27 @@ impl RetryStore {
             async move { self.bounded(limit, &client, answer).await }
         };
         let retries = self.shared.retry_limits.retries;
-        let mut is_told = false;
-        once.retry(self.shared.retry_limits.backoff().pauses())
+        let mut waiting: Option<Waiting<'_>> = None;
+        let answer = once
+            .retry(self.shared.retry_limits.backoff().pauses())
             .when(is_worth_a_try)
             .notify(|error, pause| {
-                if is_told {
-                    tracing::info!(%error, pause_ms = pause.as_millis() as u64, "trying the store again");
-                } else {
+                let is_new = waiting.is_none();
+                let waiting = waiting.get_or_insert_with(|| self.shared.outage.wait());
+                if is_new && waiting.is_first {
                     let retries_s = retries.as_secs_f64();
                     tracing::warn!(%error, "the store failed: tried again for at most {retries_s} s");
-                    is_told = true;
+                } else {
+                    tracing::info!(%error, pause_ms = pause.as_millis() as u64, "trying the store again");
                 }
             })
-            .await
+            .await;
+        if answer.is_ok()
+            && let Some(waiting) = waiting
+        {
+            waiting.went_well();
+        }
+        answer
     }
 
     async fn bounded<T>(

@@ -15,6 +15,10 @@ use crate::put::StoredGranule;
 
 /// Grids whose edges differ by less than this, in cells, are one grid.
 const SAME_GRID_CELLS: f64 = 1e-4;
+/// The same of what axes of single precision may differ by, as far as such axes are read.
+const SAME_ROUNDED_CELLS: f64 = 0.02;
+/// Edges that differ by less than this, in cells, do so by the noise of double precision.
+const NOISE_CELLS: f64 = 1e-8;
 
 /// The steps of the next manifest and what became of each file.
 #[derive(Debug, Clone, PartialEq)]
@@ -205,8 +209,23 @@ fn of_unit(quantity: Quantity) -> String {
     }
 }
 
+/// Are they one grid, but for the last digits of axes that two files have, or that were rounded when one of them was read?
 pub(crate) fn is_same_grid(a: &Grid, b: &Grid) -> bool {
-    let near = |x: f64, y: f64, cell: f64| (x - y).abs() < SAME_GRID_CELLS * cell;
+    is_near(a, b, |edge_deg, cell_deg| {
+        let rounding_deg = 2.0 * f64::from(f32::EPSILON) * edge_deg.abs();
+        let rounding_deg = rounding_deg.min(SAME_ROUNDED_CELLS * cell_deg);
+        rounding_deg.max(SAME_GRID_CELLS * cell_deg)
+    })
+}
+
+/// Do their cells lie in the same places?
+pub(crate) fn is_equal_grid(a: &Grid, b: &Grid) -> bool {
+    is_near(a, b, |_edge_deg, cell_deg| NOISE_CELLS * cell_deg)
+}
+
+/// `slack_deg`: how far an edge that lies there, of cells so wide, may be off.
+fn is_near(a: &Grid, b: &Grid, slack_deg: impl Fn(f64, f64) -> f64) -> bool {
+    let near = |x: f64, y: f64, cell: f64| (x - y).abs() < slack_deg(x, cell);
     (a.rows, a.cols) == (b.rows, b.cols)
         && near(a.north_deg, b.north_deg, a.dlat_deg)
         && near(a.south_deg(), b.south_deg(), a.dlat_deg)

@@ -173,6 +173,38 @@ fn another_grid_or_quantity_is_a_conflict() {
 }
 
 #[test]
+fn axes_that_differ_by_their_rounding_are_of_one_grid() {
+    let round = Grid {
+        rows: 100,
+        cols: 200,
+        north_deg: 40.1,
+        west_deg: 120.1,
+        dlat_deg: 0.05,
+        dlon_deg: 0.05,
+    };
+    let moved = |deg: f64| Grid {
+        west_deg: round.west_deg + deg,
+        ..round
+    };
+    // A label of single precision is off by as much there, more than a ten thousandth of a cell.
+    let rounded = moved(7.6e-6);
+    assert!(is_same_grid(&rounded, &round) && is_same_grid(&round, &rounded));
+    assert!(!is_equal_grid(&rounded, &round));
+    assert!(is_equal_grid(&moved(1e-12), &round));
+    assert!(!is_same_grid(&moved(0.001), &round));
+    // Of small cells that is much of a cell.
+    let small = Grid {
+        dlon_deg: 1e-4,
+        ..round
+    };
+    let beside = Grid {
+        west_deg: small.west_deg + 7.6e-6,
+        ..small
+    };
+    assert!(!is_same_grid(&beside, &small));
+}
+
+#[test]
 fn a_group_ends_before_the_first_period_that_comes_again() {
     let files = [
         granule("a", &[month(1)]),

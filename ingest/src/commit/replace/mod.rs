@@ -4,6 +4,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use contract::digest::Digest;
+use contract::grid::Grid;
 use contract::manifest::{MANIFEST_SCHEMA, Manifest, Step};
 use contract::notice::{NoticeOrder, NoticeRun};
 use contract::product::ProductId;
@@ -11,7 +12,7 @@ use contract::quantity::Quantity;
 use contract::time::Period;
 use storage::{StorageError, Store, manifests};
 
-use super::merge::{Taken, is_same_grid};
+use super::merge::{Taken, is_equal_grid, is_same_grid};
 use super::{ATTEMPTS, extent, race_lost};
 use crate::error::IngestError;
 use crate::limits::gates::Gates;
@@ -109,7 +110,8 @@ fn next(newest: &Manifest, readings: &[Reading]) -> Result<Manifest, String> {
         .filter(|step| !anew.contains(&file_of(step)))
         .cloned()
         .collect();
-    let quantity = quantity_of(newest, &taken, steps.is_empty())?;
+    let is_whole = steps.is_empty();
+    let quantity = quantity_of(newest, &taken, is_whole)?;
     let mut later = vec![];
     for reading in &taken {
         let held = &held[&file_of(&reading.steps[0])];
@@ -154,8 +156,8 @@ fn next(newest: &Manifest, readings: &[Reading]) -> Result<Manifest, String> {
         steps,
         ..newest.clone()
     };
-    if !is_same_grid(&first.grid, &newest.grid) {
-        next.grid = first.grid;
+    if is_whole {
+        next.grid = grid_of(newest, &taken);
     }
     // Titles can differ from file to file: that of the last step is the product's, whatever part was read anew.
     let last = next.steps.last().map(file_of);
@@ -164,6 +166,17 @@ fn next(newest: &Manifest, readings: &[Reading]) -> Result<Manifest, String> {
         next.source.clone_from(&last.source);
     }
     Ok(next)
+}
+
+/// The grid of a product of which all files were read anew: it stays as long as it is that of one of them, which may differ in the last
+/// digits of their axes.
+fn grid_of(newest: &Manifest, taken: &[&Reading]) -> Grid {
+    let is_there = |reading: &&Reading| is_equal_grid(&reading.grid, &newest.grid);
+    if taken.iter().any(is_there) {
+        newest.grid
+    } else {
+        taken[0].grid
+    }
 }
 
 /// What all files hold. Those of one product have one grid and one quantity: those that are read anew with those that are

@@ -1,6 +1,5 @@
 //! Replacing by hand-made steps: other values, other months, other grids, files that others revised.
 
-use contract::grid::Grid;
 use contract::key::ObjectKey;
 use contract::manifest::MANIFEST_SCHEMA;
 use contract::quantity::Quantity;
@@ -145,6 +144,19 @@ fn another_grid_is_taken_with_all_files_or_not_at_all() {
     };
     let both = [on(near, "a", 1), on(near, "b", 2)];
     assert_eq!(next(&newest, &both).unwrap().grid, GRID);
+    // What was read off by the rounding of labels of single precision, and is not any more, is put right: by all files.
+    let round = Grid {
+        west_deg: -180.0 + 1e-5,
+        ..GRID
+    };
+    let (a, b) = (on(round, "a", 1), on(round, "b", 2));
+    let part = next(&newest, std::slice::from_ref(&a)).unwrap();
+    assert_eq!(part.grid, GRID);
+    let all = next(&newest, &[a.clone(), b]).unwrap();
+    assert_eq!(all.grid, round);
+    // One of them is the product's.
+    let one = next(&newest, &[a, on(GRID, "b", 2)]).unwrap();
+    assert_eq!(one.grid, GRID);
 }
 
 /// Otherwise a notice that is read again could put back what was revised, or an older file go over one read anew.

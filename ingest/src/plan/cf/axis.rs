@@ -5,6 +5,7 @@ use contract::grid::{Grid, wrap_lon_deg};
 use serde::{Deserialize, Serialize};
 
 use super::coordinate::Role;
+use super::single;
 use crate::error::Rejection;
 
 /// How far a label may stand from its place on a regular axis, in cells. Labels in float32 stay well below; those of a Gaussian
@@ -43,6 +44,14 @@ pub(crate) struct Mapping {
     pub(crate) file_cols: Vec<u32>,
 }
 
+/// Labels of an axis, degrees.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Labels<'a> {
+    pub(crate) deg: &'a [f64],
+    /// The width of the cell of one label alone, where bounds say it.
+    pub(crate) only_deg: Option<f64>,
+}
+
 /// A regular axis: first label, step (signed), count.
 #[derive(Debug, Clone, Copy)]
 struct Regular {
@@ -52,15 +61,19 @@ struct Regular {
 }
 
 impl Mapping {
-    /// The grid of two axes. `names` are those of the variables, for refusals.
+    /// The grid of two axes, latitude and longitude. `names` are those of the variables, for refusals.
     pub(crate) fn from_labels(
-        lat_deg: &[f64],
-        lon_deg: &[f64],
+        [lat, lon]: [Labels<'_>; 2],
         registration: Registration,
         names: [&str; 2],
     ) -> Result<Self, Rejection> {
-        let lat = regular(lat_deg, names[0])?;
-        let lon = regular(&unwrapped(lon_deg), names[1])?;
+        let (lat_deg, lon_deg) = (lat.deg, unwrapped(lon.deg));
+        let fitted = [
+            regular(lat_deg, lat.only_deg, names[0])?,
+            regular(&lon_deg, lon.only_deg, names[1])?,
+        ];
+        let (lat, dlat) = meant(fitted[0], (lat_deg, lat_deg), snapped_step(fitted[0]));
+        let (lon, dlon) = meant(fitted[1], (lon.deg, &lon_deg), closed_step(fitted[1]));
         if lat_deg.iter().any(|v| v.abs() > 90.0 + lat.step.abs()) {
             return Err(refused(
                 names[0],
@@ -68,7 +81,6 @@ impl Mapping {
             ));
         }
         let (north_shift, west_shift) = registration.shifts();
-        let (dlat, dlon) = (snapped_step(lat), closed_step(lon));
         let northernmost = if lat.step > 0.0 {
             lat.last()
         } else {
@@ -255,13 +267,12 @@ fn unwrapped(lon_deg: &[f64]) -> Vec<f64> {
     lon_deg.iter().map(step).collect()
 }
 
-fn regular(labels: &[f64], name: &str) -> Result<Regular, Rejection> {
-    let count = u32::try_from(labels.len()).ok().filter(|n| *n >= 2);
+/// `only_deg`: the width of the cell of one label alone, where it is known.
+fn regular(labels: &[f64], only_deg: Option<f64>, name: &str) -> Result<Regular, Rejection> {
+    let count = u32::try_from(labels.len()).ok().filter(|n| *n >= 1);
     let Some(count) = count else {
-        return Err(refused(
-            name,
-            "has fewer than two labels, between which the size of cells is found; state the grid in a profile",
-        ));
+        let detail = "has no labels, or too many; state the grid in a profile";
+        return Err(refused(name, detail));
     };
     if let Some(bad) = labels.iter().find(|v| !v.is_finite() || v.abs() > 1e4) {
         return Err(refused(
@@ -272,6 +283,11 @@ fn regular(labels: &[f64], name: &str) -> Result<Regular, Rejection> {
         ));
     }
     let first = labels[0];
+    if count == 1 {
+        let detail = "has one label and no bounds, so that nothing says how wide its cell is: give it two edges (bounds), or state the grid in a profile";
+        let step = only_deg.ok_or_else(|| refused(name, detail))?;
+        return Ok(Regular { first, step, count });
+    }
     let step = (labels[labels.len() - 1] - first) / f64::from(count - 1);
     let worst = labels
         .iter()
@@ -286,6 +302,28 @@ fn regular(labels: &[f64], name: &str) -> Result<Regular, Rejection> {
         return Err(refused(name, &detail));
     }
     Ok(Regular { first, step, count })
+}
+
+/// An axis and the width of its cells, degrees: as they are fitted and taken to be, or, of labels of single precision, as they were
+/// before these were rounded.
+fn meant(fitted: Regular, (labels, places): (&[f64], &[f64]), cell_deg: f64) -> (Regular, f64) {
+    // The width of one cell is what its edges say.
+    if fitted.count == 1 {
+        return (fitted, fitted.step);
+    }
+    let is_round = (cell_deg - fitted.step.abs()).abs() > 0.0;
+    let round_deg = is_round.then(|| cell_deg.copysign(fitted.step));
+    match single::meant(labels, places, fitted.step, round_deg) {
+        Some([first, step]) => {
+            let meant = Regular {
+                first,
+                step,
+                ..fitted
+            };
+            (meant, step.abs())
+        }
+        None => (fitted, cell_deg),
+    }
 }
 
 /// A step as the round fraction (1/60) or multiple (2.5) of a degree it was meant to be, if it is close to one.
@@ -334,7 +372,11 @@ mod tests {
     }
 
     fn map(lat: &[f64], lon: &[f64], registration: Registration) -> Result<Mapping, Rejection> {
-        Mapping::from_labels(lat, lon, registration, ["lat", "lon"])
+        let labels = [lat, lon].map(|deg| Labels {
+            deg,
+            only_deg: None,
+        });
+        Mapping::from_labels(labels, registration, ["lat", "lon"])
     }
 
     const ONE_DEGREE: Grid = Grid {
@@ -526,6 +568,49 @@ mod tests {
     }
 
     #[test]
+    fn labels_in_float32_whose_edges_are_no_halves_of_cells_give_edges_of_few_decimals() {
+        let float32 = |v: Vec<f64>| {
+            v.into_iter()
+                .map(|x| f64::from(x as f32))
+                .collect::<Vec<_>>()
+        };
+        let near = |grid: Grid, wanted: [f64; 4]| {
+            let own = [grid.north_deg, grid.west_deg, grid.dlat_deg, grid.dlon_deg];
+            let off = own.iter().zip(wanted).map(|(own, wanted)| own - wanted);
+            assert!(farthest(off) < 1e-12, "{grid:?} {wanted:?}");
+        };
+        // From the south and from the north, and steps that are no part of a degree by themselves.
+        let m = map(
+            &float32(labels(20.1, 0.25, 40)),
+            &float32(labels(120.1, 0.07, 100)),
+            Registration::Center,
+        );
+        near(m.unwrap().grid, [29.975, 120.065, 0.25, 0.07]);
+        let m = map(
+            &float32(labels(60.3, -0.25, 40)),
+            &float32(labels(200.1, 0.25, 40)),
+            Registration::NorthWest,
+        );
+        near(m.unwrap().grid, [60.3, -159.9, 0.25, 0.25]);
+        // Round the earth, from anywhere.
+        let m = map(
+            &float32(labels(-89.5, 1.0, 180)),
+            &float32(labels(0.1, 0.25, 1440)),
+            Registration::Center,
+        );
+        let grid = m.unwrap().grid;
+        assert!(grid.is_periodic());
+        near(grid, [90.0, -179.775, 1.0, 0.25]);
+        // Labels that are off by more than that stay where they are.
+        let mut lat = float32(labels(20.1, 0.25, 40));
+        lat[7] += 0.001;
+        let lon = float32(labels(120.1, 0.25, 100));
+        let m = map(&lat, &lon, Registration::Center).unwrap();
+        assert!((m.grid.south_deg() - (f64::from(20.1_f32) - 0.125)).abs() < 1e-12);
+        assert!((m.grid.west_deg - 119.975).abs() < 1e-12);
+    }
+
+    #[test]
     fn a_region_across_the_date_line_stays_whole() {
         let m = map(
             &labels(9.5, -1.0, 20),
@@ -557,6 +642,38 @@ mod tests {
         assert_eq!(
             (m.grid.cols, m.grid.west_deg, m.file_cols[0]),
             (360, -179.5, 181)
+        );
+    }
+
+    #[test]
+    fn one_label_is_a_row_or_a_column_where_the_width_of_its_cell_is_known() {
+        let lon = labels(0.5, 1.0, 360);
+        let only = |deg, only_deg| Labels { deg, only_deg };
+        let mapped = |lat: Labels<'_>, lon: Labels<'_>| {
+            Mapping::from_labels([lat, lon], Registration::Center, ["lat", "lon"])
+        };
+        let m = mapped(only(&[3.0], Some(4.0625)), only(&lon, None)).unwrap();
+        let grid = Grid {
+            rows: 1,
+            north_deg: 5.03125,
+            dlat_deg: 4.0625,
+            ..ONE_DEGREE
+        };
+        assert_eq!((m.grid, &m.file_rows[..]), (grid, &[0][..]));
+        // A mean over all longitudes.
+        let lat = labels(-89.5, 1.0, 180);
+        let m = mapped(only(&lat, None), only(&[0.0], Some(360.0))).unwrap();
+        let grid = Grid {
+            cols: 1,
+            dlon_deg: 360.0,
+            ..ONE_DEGREE
+        };
+        assert_eq!((m.grid, &m.file_cols[..]), (grid, &[0][..]));
+        assert!(m.grid.is_periodic());
+        let refused = mapped(only(&[2.0], None), only(&lon, None)).unwrap_err();
+        assert!(
+            refused.detail.contains("one label and no bounds"),
+            "{refused:?}"
         );
     }
 

@@ -13,6 +13,7 @@ pub(crate) mod packing;
 pub(crate) mod period;
 pub(crate) mod projection;
 pub(crate) mod quantity;
+mod single;
 pub(crate) mod spacing;
 pub(crate) mod unmarked;
 mod year_end;

@@ -89,6 +89,43 @@ async fn why_a_full_store_is_waited_for_is_told_once_and_at_once() {
 }
 
 #[tokio::test]
+async fn objects_that_wait_together_are_told_of_once_and_counted_in_the_end() {
+    let (warned, _guard) = Warnings::kept();
+    let faulty = Faulty::always(Fault::Fail(full));
+    let store = store(&faulty);
+    let keys: Vec<ObjectKey> = (1..=5)
+        .map(|number| {
+            format!("manifests/p/000000000{number}.json")
+                .parse()
+                .unwrap()
+        })
+        .collect();
+    let puts = keys.iter().map(|key| store.put_new(key, Bytes::from("x")));
+    let room = async {
+        while faulty.put_count() < keys.len() {
+            tokio::task::yield_now().await;
+        }
+        *faulty.always.lock().unwrap() = None;
+    };
+    let (stored, ()) = tokio::join!(futures::future::join_all(puts), room);
+    assert!(stored.into_iter().all(|stored| stored.unwrap()));
+    let lines = warned.lines();
+    let [first, last] = &lines[..] else {
+        panic!("{lines:?}");
+    };
+    assert!(first.contains(&full().to_string()), "{first}");
+    assert!(
+        last.contains("5 objects waited for the store: 5 of them went well"),
+        "{last}"
+    );
+    // The next time is another one.
+    *faulty.always.lock().unwrap() = Some(Fault::Fail(full));
+    let key = "manifests/p/0000000006.json".parse().unwrap();
+    store.put_new(&key, Bytes::from("x")).await.unwrap_err();
+    assert_eq!(warned.lines().len(), 3);
+}
+
+#[tokio::test]
 async fn a_refusal_is_told_at_once() {
     let faulty = Faulty::always(Fault::Fail(denied));
     let error = store(&faulty)
