@@ -10,6 +10,7 @@ mod derived;
 mod export;
 mod fill;
 mod flight_sql;
+mod follow;
 mod ground;
 mod landing;
 mod look;
