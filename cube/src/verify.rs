@@ -17,7 +17,7 @@ use storage::{StorageError, Store, manifests};
 
 use crate::follow::folder;
 use crate::object_storage::is_initial;
-use crate::{At, Cube, CubeError, Repository, Step, compact, complete, series};
+use crate::{At, Cube, CubeError, Repository, Step, clocks, compact, complete, series};
 
 /// What a cube was found to be.
 #[derive(Debug, Clone, Default)]
@@ -317,7 +317,7 @@ impl Check<'_> {
 ///
 /// # Errors
 /// The store does not answer: a sound cube is as it was, another one is made by the next call. A field that the cube is made of is damaged or
-/// gone.
+/// gone. `Clock` where nothing can be committed: whatever there is stays.
 pub fn mend<'a>(
     store: &'a Store,
     product: &'a ProductId,
@@ -343,6 +343,7 @@ pub fn mend<'a>(
             compact::compact(store, &folder).await?;
             return Ok(false);
         }
+        clocks::check(store, &folder).await?;
         remove(store, keys, &folder).await?;
         // Asked for now: others may have published meanwhile, and their version was in the cube that is gone.
         for number in manifests::numbers(store, product).await? {
@@ -358,12 +359,15 @@ pub fn mend<'a>(
 /// Brings a sound cube to the newest version of its product; false if it is of one that is no more, or cannot be brought there.
 ///
 /// # Errors
-/// What says nothing of the cube: a store that does not answer, a field that is damaged or gone.
+/// What says nothing of the cube: a store that does not answer, a field that is damaged or gone, a clock by which nothing can be committed.
 async fn follows(store: &Store, newest: &Manifest) -> Result<bool, CubeError> {
     let followed = match crate::follow(store, newest).await {
         Ok(followed) => followed.version,
-        // Nor would what is made again: the store fails, or what the newest version is made of is damaged.
-        Err(error) if error.is_retryable() || matches!(error, CubeError::Storage(_)) => {
+        // Nor would what is made again: the store fails, what the newest version is made of is damaged, or the clock is wrong.
+        Err(error)
+            if error.is_retryable()
+                || matches!(error, CubeError::Storage(_) | CubeError::Clock { .. }) =>
+        {
             return Err(error);
         }
         Err(error) => {
