@@ -222,8 +222,10 @@ async fn each_part_that_is_gone_or_damaged_is_told_and_the_cube_made_again() {
         let is_found = !damaged.is_empty() || !checked.findings.is_empty();
         let is_needed = matches!(part.as_str(), "chunks" | "manifests" | "repo");
         assert!(is_found || !is_needed, "{key} gone: {checked:?}");
+        let mending = verify::mending(&store, &product).await.unwrap();
+        let is_to_be_made = mending == verify::Mending::MadeAgain;
         let is_made = verify::mend(&store, &product).await.unwrap();
-        assert_eq!(is_made, is_found, "{key}");
+        assert_eq!((is_to_be_made, is_made), (is_found, is_found), "{key}");
         let newest = [(1, 10), (2, 2), (3, 3)];
         holds(&store, At::Newest, &versions[2], &newest).await;
         if is_made {
@@ -250,7 +252,11 @@ async fn a_cube_that_is_behind_is_told_and_brought_up() {
     };
     assert_eq!(finding.fault, Fault::Behind);
     assert!(finding.reason.contains("p@4-"), "{}", finding.reason);
+    let mending = verify::mending(&store, &product).await;
+    assert_eq!(mending.unwrap(), verify::Mending::BroughtUp);
     assert!(!verify::mend(&store, &product).await.unwrap());
+    let mending = verify::mending(&store, &product).await;
+    assert_eq!(mending.unwrap(), verify::Mending::Nothing);
     holds(&store, At::Newest, &next, &[(1, 10)]).await;
 }
 
