@@ -569,6 +569,39 @@ mod tests {
     }
 
     #[test]
+    fn where_a_period_is_asked_for_it_is_said_how_steps_across_its_ends_count() {
+        let mut program = Cli::command();
+        program.build();
+        for (words, asked) in [
+            ("stats point", "from"),
+            ("stats line", "from"),
+            ("stats polygon", "from"),
+            ("stats correlate", "from"),
+            ("stats difference", "period"),
+            ("stats difference", "minus_period"),
+            ("stats hovmoller", "from"),
+            ("budget", "from"),
+            ("derive", "from"),
+            ("derive co2-flux", "from"),
+            ("derive regrid", "from"),
+            ("derive statistic", "from"),
+            ("derive accumulated", "start"),
+        ] {
+            let command = words.split(' ').fold(&program, |command, name| {
+                command.find_subcommand(name).unwrap()
+            });
+            let mut all = command.get_arguments();
+            let help = all.find(|one| one.get_id() == asked).unwrap().get_help();
+            let help = help.unwrap().to_string().to_lowercase();
+            let is_said = ["count", "is computed, and whole"];
+            assert!(
+                is_said.iter().any(|it| help.contains(it)),
+                "{words}: {help}"
+            );
+        }
+    }
+
+    #[test]
     fn what_surrounds_a_picture_stands_apart_and_is_read_or_refused() {
         let mut program = Cli::command();
         program.build();

@@ -59,7 +59,7 @@ pub(crate) enum DeriveWhat {
         /// Product, a carbon flux.
         #[arg(long)]
         product: ProductId,
-        /// Where accumulation starts; the product's first instant if absent.
+        /// Where accumulation starts; the product's first instant if absent. A step that it lies in counts by its time after it.
         #[arg(long)]
         start: Option<TimeMs>,
         #[command(flatten)]
