@@ -341,9 +341,9 @@ async fn where_the_clock_lets_nothing_be_committed_no_cube_is_removed() {
     let next = version(&inner, grid(40, 60), 4, &[(1, 10)]).await;
     manifests::commit(&inner, &next).await.unwrap();
     let product = "p".parse().unwrap();
+    let chunk = inner.list("cubes/p/chunks").await.unwrap().remove(0);
     for is_damaged in [false, true] {
         if is_damaged {
-            let chunk = inner.list("cubes/p/chunks").await.unwrap().remove(0);
             inner.remove(&chunk).await.unwrap();
         }
         let all = keys(&inner).await;

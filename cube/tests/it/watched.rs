@@ -39,7 +39,11 @@ pub(crate) fn watched(
 
 /// The same store with a clock that is ahead of this machine's, or behind it.
 pub(crate) fn ahead(store: &Store, ahead: TimeDelta) -> (Store, Arc<Mutex<Vec<String>>>) {
-    layered(store, Arc::new(|_key| async { Ok(()) }.boxed()), ahead)
+    layered(
+        store,
+        Arc::new(|_key: &str| async { Ok(()) }.boxed()),
+        ahead,
+    )
 }
 
 fn layered(store: &Store, before: Before, ahead: TimeDelta) -> (Store, Arc<Mutex<Vec<String>>>) {
