@@ -130,6 +130,9 @@ pub enum ComputeError {
         /// The limit, MiB.
         limit_mib: usize,
     },
+    /// What was worked out for somebody who has left; nobody is told.
+    #[error("nobody waits for it any more")]
+    NotAwaited,
     /// A server that anybody could ask, or a token that is none.
     #[error("access: {reason}")]
     Access {
@@ -249,9 +252,10 @@ impl ComputeError {
                 retryable_if(failure::of_ballista(source) == Failure::Passing)
             }
             Self::ClusterAway { source, .. } => source.class(),
-            Self::Overdue { .. } | Self::AskedOtherwise { .. } | Self::OtherMethod { .. } => {
-                ErrorClass::Retryable
-            }
+            Self::Overdue { .. }
+            | Self::NotAwaited
+            | Self::AskedOtherwise { .. }
+            | Self::OtherMethod { .. } => ErrorClass::Retryable,
             Self::Machine { .. } | Self::Metrics(_) | Self::Inconsistent { .. } => {
                 ErrorClass::Internal
             }

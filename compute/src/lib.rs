@@ -6,6 +6,7 @@
 
 pub mod air_sea;
 pub mod analysis;
+mod awaited;
 pub mod budget;
 pub mod catalogue;
 pub mod check;

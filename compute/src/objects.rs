@@ -17,11 +17,13 @@ use quick_cache::Weighter;
 use quick_cache::sync::Cache;
 use storage::fields::Reader;
 use storage::rows::{RowIndex, Stored};
+use storage::weights::SharedAreas;
 use storage::{StorageError, Store, manifests, spool};
 use tokio::sync::Semaphore;
 use url::{Position, Url};
 
 use crate::ComputeError;
+use crate::awaited::{Awaited, SharedWork, Work};
 use crate::open_versions::OpenVersions;
 use crate::reduce::held_shares::HeldShares;
 use crate::reduce::remembered::Remembered;
@@ -38,15 +40,21 @@ pub struct Objects {
     root: Url,
     store: Arc<dyn ObjectStore>,
     weights: Arc<LoadedWeights>,
+    /// Weights that are being computed, by what they will be held under.
+    weighing: Arc<SharedWork<Chunks>>,
     /// Where rows lie in files that were read, by their path.
     row_indexes: Arc<Cache<ObjectPath, Option<Arc<RowIndex>>, ByRows>>,
     extents: Arc<Cache<Digest, Extent>>,
+    measuring: Arc<SharedWork<Extent>>,
     sums: Arc<Remembered>,
     shares: Arc<HeldShares>,
     open_versions: Arc<OpenVersions>,
     /// Where functions that compute products store them.
     storing: Option<Storing>,
 }
+
+/// Areas of a region's share of every cell, m², by chunk.
+type Chunks = Vec<(u32, SharedAreas)>;
 
 /// Files whose rows are known: series of 16 years of a few products.
 const HELD_INDEXES: usize = 256;
@@ -123,8 +131,10 @@ impl Objects {
             root,
             store: Arc::new(TailStore::new(Arc::new(RetryStore::new(store)))),
             weights: Arc::default(),
+            weighing: Arc::default(),
             row_indexes: Arc::new(Cache::with_weighter(HELD_INDEXES, HELD_ROWS, ByRows)),
             extents: Arc::new(Cache::new(HELD_EXTENTS)),
+            measuring: Arc::default(),
             sums: Arc::default(),
             shares: Arc::default(),
             open_versions: Arc::new(OpenVersions::new()),
@@ -138,16 +148,23 @@ impl Objects {
     }
 
     /// A region's weights by their address, or by the question that they answer: read or computed once, whoever asks and
-    /// however often.
+    /// however often. What is computed ends early when all who asked have left.
     pub(crate) async fn weights(
         &self,
         address: &str,
     ) -> Result<Arc<RegionWeights>, DataFusionError> {
-        if let Some(question) = ComputedWeights::of_text(address).map_err(external)? {
-            let computing = self.computed(question);
+        let name = ComputedWeights::name(address);
+        // The question of a region of very many corners is long: what is held is found without reading it.
+        if let Some(held) = name.as_deref().and_then(|name| self.weights.held(name)) {
+            return Ok(held);
+        }
+        let question = ComputedWeights::of_text(address).map_err(external)?;
+        if let (Some(name), Some(question)) = (name, question) {
+            // Held until there is an answer: it is what keeps the work alive.
+            let work = self.weighing.join(&name);
             return self
                 .weights
-                .get(&ComputedWeights::name(address), computing)
+                .get(&name, self.computed(question, &work))
                 .await;
         }
         self.weights
@@ -161,9 +178,13 @@ impl Objects {
             .await
     }
 
-    async fn computed(&self, question: ComputedWeights) -> Result<RegionWeights, DataFusionError> {
+    async fn computed(
+        &self,
+        question: ComputedWeights,
+        work: &Work<Chunks>,
+    ) -> Result<RegionWeights, DataFusionError> {
         if question.grid.cell_count() as u64 > BAND_CELLS {
-            return self.computed_in_bands(question).await;
+            return self.computed_in_bands(question, work).await;
         }
         let shares = match (question.surface.shares(), &question.shares_at) {
             (Some(shares), Some(address)) => {
@@ -173,9 +194,8 @@ impl Objects {
             }
             _ => None,
         };
-        let computing = move || question.chunks(shares.as_deref());
-        let chunks = tokio::task::spawn_blocking(computing).await;
-        let chunks = chunks.map_err(|e| DataFusionError::External(e.into()))?;
+        let computing = move |awaited: &Awaited| question.chunks(shares.as_deref(), awaited);
+        let chunks = work.done(computing).await;
         chunks.map(RegionWeights::new).map_err(external)
     }
 
@@ -183,20 +203,13 @@ impl Objects {
     async fn computed_in_bands(
         &self,
         question: ComputedWeights,
+        work: &Work<Chunks>,
     ) -> Result<RegionWeights, DataFusionError> {
-        let computing = move || match question.to_weigh() {
-            Ok(Some(chunks)) => Ok((question, chunks, true)),
-            Ok(None) => question
-                .chunks(None)
-                .map(|chunks| (question, chunks, false)),
-            Err(e) => Err(e),
-        };
-        let computed = tokio::task::spawn_blocking(computing).await;
-        let computed = computed.map_err(|e| DataFusionError::External(e.into()))?;
-        let (question, chunks, is_weighed) = computed.map_err(external)?;
-        let (true, Some(shares), Some(address)) =
-            (is_weighed, question.surface.shares(), &question.shares_at)
-        else {
+        let question = Arc::new(question);
+        let own = Arc::clone(&question);
+        let computing = move |awaited: &Awaited| own.to_weigh(awaited);
+        let chunks = work.done(computing).await.map_err(external)?;
+        let (Some(shares), Some(address)) = (question.weighed_by(), &question.shares_at) else {
             return Ok(RegionWeights::new(chunks));
         };
         let unread = |e: StorageError| DataFusionError::External(e.into());
@@ -292,9 +305,16 @@ impl Objects {
         Ok(Some(opened))
     }
 
-    /// Extents of regions by the digest of the region and of how it is measured.
-    pub(crate) fn extents(&self) -> &Cache<Digest, Extent> {
-        &self.extents
+    /// The extent of a region by the digest of the region and of how it is measured: measured once, whoever asks, and left when all who asked
+    /// have.
+    pub(crate) async fn extent(
+        &self,
+        name: &Digest,
+        measure: impl FnOnce(&Awaited) -> Result<Extent, ComputeError> + Send + 'static,
+    ) -> Result<Extent, ComputeError> {
+        let work = self.measuring.join(&name.to_string());
+        let measured = work.done(measure);
+        self.extents.get_or_insert_async(name, measured).await
     }
 }
 

@@ -21,7 +21,7 @@ pub use wishes::{Annotation, AnnotationWishes, Wanted};
 
 /// Raised whenever the same annotations are drawn differently, so that old pictures are not taken for new ones; pictures
 /// without annotations keep their names. `BLESS=1` of the golden annotated pictures asks for it.
-pub const ANNOTATION_VERSION: u32 = 4;
+pub const ANNOTATION_VERSION: u32 = 5;
 
 /// What is drawn over a picture of the globe. Nothing of it is in the name of a picture without.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -29,7 +29,7 @@ pub const ANNOTATION_VERSION: u32 = 4;
 pub struct Annotations {
     /// [`ANNOTATION_VERSION`].
     pub version: u32,
-    /// What the colours mean: those of a quantity, or of its speed in a flow.
+    /// What the colours mean: those of a quantity, or of its speed in a flow; and which values isolines are of, where it has them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub legend: Option<Quantity>,
     /// When.

@@ -1,6 +1,7 @@
 //! SHA-256 digests as lower-case hexadecimal text: the names of immutable things.
 
 use std::fmt::{Display, Formatter};
+use std::io;
 
 use serde::de::Visitor;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -35,12 +36,47 @@ impl Digest {
     /// # Panics
     /// Never: the types that are hashed have string keys only, which JSON can always hold.
     pub fn of_json<T: Serialize>(value: &T) -> Self {
-        Self::of(&serde_json::to_vec(value).expect("hashed types have string keys only"))
+        let mut hashing = Hashing::default();
+        serde_json::to_writer(&mut hashing, value).expect("hashed types have string keys only");
+        hashing.digest()
     }
 
     /// The first eight hexadecimal digits, for people.
     pub fn short(&self) -> String {
         self.to_string()[..8].to_owned()
+    }
+}
+
+/// Bytes that are hashed together: less takes longer.
+const HASHED_BYTES: usize = 16 << 10;
+
+/// Hashes a text as it is written. That of a region of very many corners takes tens of megabytes, and is never held.
+#[derive(Default)]
+struct Hashing {
+    sha256: Sha256,
+    /// What is not hashed yet.
+    written: Vec<u8>,
+}
+
+impl Hashing {
+    fn digest(mut self) -> Digest {
+        self.sha256.update(&self.written);
+        Digest(self.sha256.finalize().into())
+    }
+}
+
+impl io::Write for Hashing {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.written.extend_from_slice(bytes);
+        if self.written.len() >= HASHED_BYTES {
+            self.sha256.update(&self.written);
+            self.written.clear();
+        }
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
     }
 }
 
@@ -129,6 +165,15 @@ mod tests {
             "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855"
         );
         assert_eq!(text.parse::<Digest>().unwrap(), Digest::of(b""));
+    }
+
+    #[test]
+    fn json_of_any_length_has_the_digest_of_its_text() {
+        for length in [0, 1, HASHED_BYTES - 3, HASHED_BYTES, 5 * HASHED_BYTES + 7] {
+            let value = ("x".repeat(length), vec![-1.5e-7; length]);
+            let text = serde_json::to_vec(&value).unwrap();
+            assert_eq!(Digest::of_json(&value), Digest::of(&text), "{length}");
+        }
     }
 
     #[test]

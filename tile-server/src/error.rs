@@ -101,6 +101,11 @@ pub enum ServerError {
     /// The value has none of the bytes that are asked for.
     #[error("there are {length} bytes here, and none of those in the header Range")]
     NoRange { length: u64 },
+    /// The file is another one than the client wants.
+    #[error(
+        "the file here is not the one that the header If-Match or If-Unmodified-Since asks for; ask without it"
+    )]
+    Changed,
     /// This server has no observations.
     #[error("there are no observations here")]
     NoObservations,
@@ -221,7 +226,7 @@ impl ServerError {
             Self::ReadOnly | Self::AskedOnly => StatusCode::METHOD_NOT_ALLOWED,
             Self::NoGeoJson => StatusCode::UNSUPPORTED_MEDIA_TYPE,
             Self::NoEncoding => StatusCode::NOT_ACCEPTABLE,
-            Self::Unchanged => StatusCode::PRECONDITION_FAILED,
+            Self::Unchanged | Self::Changed => StatusCode::PRECONDITION_FAILED,
             Self::BodyTooLarge { .. } => StatusCode::PAYLOAD_TOO_LARGE,
             Self::NoRange { .. } => StatusCode::RANGE_NOT_SATISFIABLE,
             Self::Busy
@@ -300,6 +305,11 @@ impl IntoResponse for ServerError {
         headers.insert(header::CACHE_CONTROL, HeaderValue::from_static("no-store"));
         if let Some(seconds) = self.retry_after_s() {
             headers.insert(header::RETRY_AFTER, seconds.into());
+        }
+        if let Self::NoRange { length } = &self {
+            // What there is, so that who asks need not ask for all to know (RFC 9110, 15.5.17).
+            let all = HeaderValue::try_from(format!("bytes */{length}"));
+            headers.insert(header::CONTENT_RANGE, all.expect("digits are printable"));
         }
         if matches!(self, Self::TooManyStreams) {
             // Who has no stream keeps no connection from others either.

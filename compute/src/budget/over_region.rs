@@ -9,8 +9,9 @@ use contract::region::Region;
 use super::fixed::AREA_DECIMALS;
 use super::measure::Measure;
 use super::sums::{self, RegionSums};
+use crate::awaited::Awaited;
 use crate::region::address::RegionAddress;
-use crate::region::extent::{Extent, extent, outline};
+use crate::region::extent::{Extent, extent_while, outline};
 use crate::region::shares::{self, Shares};
 use crate::region::weights::{OnGrid, Surface};
 use crate::{ComputeError, Engine};
@@ -84,19 +85,14 @@ pub(crate) async fn extent_of(
     let (region, earth) = (asked.region.clone(), asked.earth);
     let name = Digest::of_json(&(&region, earth, has_shares));
     // Overlaid with all land, which takes a while.
-    let measured = async move {
-        let measure = move || {
-            if has_shares {
-                outline(&region, earth)
-            } else {
-                extent(&region, earth)
-            }
-        };
-        let found = tokio::task::spawn_blocking(measure).await;
-        found.map_err(|e| ComputeError::inconsistent("region", e))?
+    let measure = move |awaited: &Awaited| {
+        if has_shares {
+            outline(&region, earth, awaited)
+        } else {
+            extent_while(&region, earth, awaited)
+        }
     };
-    let known = engine.objects().extents();
-    known.get_or_insert_async(&name, measured).await
+    engine.objects().extent(&name, measure).await
 }
 
 /// What is to be said of a region of which a part lies beside the grid.

@@ -71,11 +71,11 @@ mod tests {
         };
         let others = [
             Question {
-                whole: "other".to_owned(),
+                whole: "other".into(),
                 ..question()
             },
             Question {
-                covered: "other".to_owned(),
+                covered: "other".into(),
                 ..question()
             },
             Question {

@@ -18,7 +18,7 @@ use crate::{ComputeError, Engine};
 /// A region's weights on a product's grid, and where they are.
 pub(crate) struct RegionOnGrid {
     /// Addresses of all of it and of its sea.
-    pub(crate) addresses: [String; 2],
+    pub(crate) addresses: [Arc<str>; 2],
     /// All of it.
     pub(crate) whole: Arc<RegionWeights>,
     /// Its sea.

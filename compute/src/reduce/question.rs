@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::ops::Range;
+use std::sync::Arc;
 
 use contract::chunk::{CHUNK_COLS, CHUNK_ROWS};
 use contract::digest::Digest;
@@ -39,9 +40,9 @@ pub(super) struct Question {
     pub(super) version: ManifestId,
     pub(super) shape: Shape,
     /// Address of the weights, or the question that they answer.
-    pub(super) whole: String,
+    pub(super) whole: Arc<str>,
     /// The same of what coverage counts.
-    pub(super) covered: String,
+    pub(super) covered: Arc<str>,
     pub(super) unit: WeightUnit,
     pub(super) scale: Scale,
     pub(super) wanted: Wanted,

@@ -26,7 +26,7 @@ const OUTSIDE_SHARE: f64 = 1e-6;
 pub(super) struct Weighed {
     pub(super) shape: Shape,
     /// Address of what is summed, and of what coverage counts.
-    pub(super) addresses: [String; 2],
+    pub(super) addresses: [Arc<str>; 2],
     whole: Arc<RegionWeights>,
     covered: Arc<RegionWeights>,
     pub(super) unit: WeightUnit,
@@ -129,7 +129,7 @@ impl Weighed {
             surface: Surface::All,
             shares_at: None,
         };
-        let address = question.text();
+        let address: Arc<str> = question.text().into();
         let whole = loaded(engine, &address).await?;
         let is_line = matches!(query.geometry, Geometry::Line(_));
         let on_grid = total(&whole);

@@ -3,6 +3,8 @@
 //! An engine that answers strangers stores nothing for them, however many regions they think of. Regions that have a name
 //! are few: their weights are stored for everybody.
 
+use std::sync::Arc;
+
 use contract::geometry::Geometry;
 use contract::key::ObjectKey;
 use contract::region::{NAMED_REGIONS, NamedRegion};
@@ -18,16 +20,16 @@ use crate::{ComputeError, Engine};
 pub(crate) struct RegionAddress {
     /// What they are stored under, if anybody stored them; sums are named by it either way.
     pub(crate) keys: RegionKeys,
-    /// Of all of the region: an address, or a question.
-    pub(crate) all: String,
+    /// Of all of the region: an address, or a question, which is as long as the text of the region and held once however many ask it.
+    pub(crate) all: Arc<str>,
     /// The same of its sea.
-    pub(crate) ocean: String,
+    pub(crate) ocean: Arc<str>,
 }
 
 impl RegionAddress {
     /// Weights that are stored.
     pub(crate) fn stored(store: &Store, keys: RegionKeys) -> Self {
-        let address = |key| store.sql_url(key).to_string();
+        let address = |key| store.sql_url(key).to_string().into();
         Self {
             all: address(&keys.all),
             ocean: address(&keys.ocean),
@@ -100,9 +102,9 @@ async fn found_or_asked(
     key: &ObjectKey,
     asked: OnGrid<'_>,
     surface: &Surface,
-) -> Result<String, ComputeError> {
+) -> Result<Arc<str>, ComputeError> {
     match storage::weights::check(store, key).await {
-        Ok(()) => return Ok(store.sql_url(key).to_string()),
+        Ok(()) => return Ok(store.sql_url(key).to_string().into()),
         Err(e) if e.is_not_found() => {}
         Err(error @ StorageError::Damaged { .. }) => {
             tracing::warn!(%error, "weights are computed again");
@@ -119,5 +121,5 @@ async fn found_or_asked(
             .map(|shares| store.sql_url(&shares.field).to_string()),
     };
     question.check_size()?;
-    Ok(question.text())
+    Ok(question.text().into())
 }

@@ -12,8 +12,10 @@ use storage::weights::SharedAreas;
 use super::cut::bounds_deg;
 use super::line_cover::lengths_m;
 use super::place_cover;
+use super::shares::Shares;
 use super::weights::{Surface, shared_of};
 use crate::ComputeError;
+use crate::awaited::Awaited;
 
 /// What such a text begins with; addresses of stored weights do not.
 const MARK: &str = "computed:";
@@ -52,9 +54,10 @@ impl ComputedWeights {
             .map(Some)
     }
 
-    /// What the answer is remembered by.
-    pub(crate) fn name(text: &str) -> String {
-        format!("{MARK}{}", Digest::of(text.as_bytes()))
+    /// What the answer to a text is remembered by; none if it is an address.
+    pub(crate) fn name(text: &str) -> Option<String> {
+        let is_question = text.starts_with(MARK);
+        is_question.then(|| format!("{MARK}{}", Digest::of(text.as_bytes())))
     }
 
     /// # Errors
@@ -74,26 +77,39 @@ impl ComputedWeights {
         Err(ComputeError::Region { reason })
     }
 
-    /// Areas of all of a region, m², by chunk, where those of its sea come of shares that are read band by band; none if this is
-    /// no region of such.
-    pub(crate) fn to_weigh(&self) -> Result<Option<Vec<(u32, SharedAreas)>>, ComputeError> {
-        let (Geometry::Region(region), Some(_)) = (&self.geometry, self.surface.shares()) else {
-            return Ok(None);
-        };
-        self.check_size()?;
-        let all = Surface::All;
-        shared_of(&self.grid, region, self.earth, &all, None).map(Some)
+    /// The shares of sea that areas of a region are weighed by; none if this is no region of such.
+    pub(crate) fn weighed_by(&self) -> Option<&Shares> {
+        match &self.geometry {
+            Geometry::Region(_) => self.surface.shares(),
+            Geometry::Line(_) | Geometry::Point { .. } => None,
+        }
+    }
+
+    /// The same with shares that are read band by band, which areas of all of a region are to be weighed by: without them.
+    pub(crate) fn to_weigh(
+        &self,
+        awaited: &Awaited,
+    ) -> Result<Vec<(u32, SharedAreas)>, ComputeError> {
+        match (&self.geometry, self.weighed_by()) {
+            (Geometry::Region(region), Some(_shares)) => {
+                self.check_size()?;
+                shared_of(&self.grid, region, self.earth, &Surface::All, None, awaited)
+            }
+            _ => self.chunks(None, awaited),
+        }
     }
 
     /// Areas of a region's share of every cell, m², lengths of a line's, m, or shares of a place, by chunk; `shares` is `[row, col]`, where the surface needs them.
     pub(crate) fn chunks(
         &self,
         shares: Option<&[f32]>,
+        awaited: &Awaited,
     ) -> Result<Vec<(u32, SharedAreas)>, ComputeError> {
         self.check_size()?;
         match &self.geometry {
             Geometry::Region(region) => {
-                shared_of(&self.grid, region, self.earth, &self.surface, shares)
+                let (grid, surface) = (&self.grid, &self.surface);
+                shared_of(grid, region, self.earth, surface, shares, awaited)
             }
             Geometry::Line(line) => lengths_m(&self.grid, line, self.earth).map(shared),
             Geometry::Point { place, sampling } => {
@@ -293,6 +309,7 @@ mod tests {
         for region in ["global", "-0.1,0.2,170.3,0.30000000000000004", holed] {
             let question = asked(7, region);
             let text = question.text();
+            assert!(ComputedWeights::name(&text).is_some());
             assert_eq!(ComputedWeights::of_text(&text).unwrap(), Some(question));
         }
         let line = Geometry::Line(
@@ -313,6 +330,7 @@ mod tests {
             assert_eq!(ComputedWeights::of_text(&text).unwrap(), Some(question));
         }
         assert_eq!(ComputedWeights::of_text("file:///weights/a").unwrap(), None);
+        assert_eq!(ComputedWeights::name("file:///weights/a"), None);
         assert!(ComputedWeights::of_text("computed:{}").is_err());
     }
 
@@ -326,7 +344,8 @@ mod tests {
                 cells_in_bounds(&asked(60, region).grid, &region.parse().unwrap()),
                 cells
             );
-            let refused = asked(60, region).chunks(None).unwrap_err().to_string();
+            let refused = asked(60, region).chunks(None, &Awaited::always());
+            let refused = refused.unwrap_err().to_string();
             assert!(refused.contains("fluxglobe budget"), "{refused}");
         }
         let polygon = "POLYGON((10 10,20 10,20 20,10 10))";

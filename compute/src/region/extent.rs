@@ -5,10 +5,11 @@ use contract::region::{Polygon, Region};
 
 use super::area::signed_area_m2;
 use super::ring::Ring;
-use super::rings::{checked, rings};
+use super::rings::{checked, rings, rings_while};
 use super::sea::sea;
 use super::union::{coarsest_step_deg, groups};
 use crate::ComputeError;
+use crate::awaited::Awaited;
 
 /// Edges wider than this may have been meant to go the other way round, degrees.
 const WIDE_EDGE_DEG: f64 = 180.0;
@@ -28,18 +29,20 @@ pub struct Extent {
 
 /// Area of a region, m², wherever grids may lie.
 pub fn region_area_m2(region: &Region, earth: Earth) -> Result<f64, ComputeError> {
+    Ok(area_m2(region, &rings(region)?, earth))
+}
+
+/// The same by its rings.
+fn area_m2(region: &Region, rings: &[Ring], earth: Earth) -> f64 {
     match region {
-        Region::Global => Ok(earth.cell_area_m2(-90.0, 90.0, 360.0)),
+        Region::Global => earth.cell_area_m2(-90.0, 90.0, 360.0),
         Region::Box {
             west,
             south,
             east,
             north,
-        } => Ok(earth.cell_area_m2(*south, *north, east - west)),
-        Region::Polygons(_) => Ok(rings(region)?
-            .iter()
-            .map(|ring| signed_area_m2(ring, earth))
-            .sum()),
+        } => earth.cell_area_m2(*south, *north, east - west),
+        Region::Polygons(_) => rings.iter().map(|ring| signed_area_m2(ring, earth)).sum(),
     }
 }
 
@@ -73,16 +76,44 @@ pub(crate) fn rounding_m2(polygons: &[Polygon]) -> f64 {
 
 /// The extent of a region; its sea is what is no land of Natural Earth.
 pub fn extent(region: &Region, earth: Earth) -> Result<Extent, ComputeError> {
-    let of_sea = sea(&rings(region)?)
+    extent_while(region, earth, &Awaited::always())
+}
+
+/// The same for as long as it is awaited.
+///
+/// # Errors
+/// Those of the region, and `NotAwaited`.
+pub(crate) fn extent_while(
+    region: &Region,
+    earth: Earth,
+    awaited: &Awaited,
+) -> Result<Extent, ComputeError> {
+    let rings = rings_while(region, awaited)?;
+    awaited.check()?;
+    let of_sea = sea(&rings)?
         .iter()
         .map(|ring| signed_area_m2(ring, earth))
         .sum();
-    Ok(outline(region, earth)?.with_ocean(of_sea))
+    awaited.check()?;
+    Ok(outlined(region, &rings, earth)?.with_ocean(of_sea))
 }
 
-/// The extent of a region without its sea.
-pub(crate) fn outline(region: &Region, earth: Earth) -> Result<Extent, ComputeError> {
-    let area_m2 = region_area_m2(region, earth)?;
+/// The extent of a region without its sea, for as long as it is awaited.
+///
+/// # Errors
+/// Those of the region, and `NotAwaited`.
+pub(crate) fn outline(
+    region: &Region,
+    earth: Earth,
+    awaited: &Awaited,
+) -> Result<Extent, ComputeError> {
+    let rings = rings_while(region, awaited)?;
+    awaited.check()?;
+    outlined(region, &rings, earth)
+}
+
+fn outlined(region: &Region, rings: &[Ring], earth: Earth) -> Result<Extent, ComputeError> {
+    let area_m2 = area_m2(region, rings, earth);
     let mut notes = vec![];
     if let Region::Polygons(polygons) = region {
         notes.extend(wide_edge(polygons));
@@ -114,7 +145,10 @@ fn wide_edge(polygons: &[Polygon]) -> Option<String> {
     let edges = polygons
         .iter()
         .flat_map(|polygon| std::iter::once(&polygon.outer).chain(&polygon.holes))
-        .flat_map(|ring| Ring::new(ring.clone()).edges().collect::<Vec<_>>());
+        .flat_map(|ring| {
+            let next = ring.iter().cycle().skip(1);
+            ring.iter().zip(next).map(|(from, to)| [*from, *to])
+        });
     let [from, to] = edges
         .filter(|edge| width_deg(edge) > WIDE_EDGE_DEG)
         // Edges along a parallel from 180 to -180 are how maps of the whole world end.
@@ -200,13 +234,25 @@ mod tests {
             };
             let text = format!("MULTIPOLYGON({},{})", ring(first), ring(second));
             let region: Region = text.parse().unwrap();
-            outline(&region, Earth::Wgs84).unwrap().notes
+            let outline = outline(&region, Earth::Wgs84, &Awaited::always());
+            outline.unwrap().notes
         };
         let beside = strips([["0", "0.0000101"], ["0.0000101", "0.0000202"]]);
         assert_eq!(beside, Vec::<String>::new());
         let over = strips([["0", "0.0000202"], ["0.0000101", "0.0000303"]]);
         assert_eq!(over.len(), 1, "{over:?}");
         assert!(over[0].contains("rings cross"), "{over:?}");
+    }
+
+    #[test]
+    fn what_nobody_waits_for_is_not_measured() {
+        let region: Region = "POLYGON((0 0,10 1,20 0,10 9,0 0))".parse().unwrap();
+        let never = Awaited::never();
+        for measure in [extent_while, outline] {
+            let ended = measure(&region, Earth::Wgs84, &never);
+            assert!(matches!(ended, Err(ComputeError::NotAwaited)), "{ended:?}");
+            measure(&region, Earth::Wgs84, &Awaited::always()).unwrap();
+        }
     }
 
     #[test]

@@ -8,6 +8,7 @@ use i_overlay::i_float::int::point::IntPoint;
 use i_overlay::i_shape::int::shape::{IntContour, IntShapes};
 
 use super::ring::Ring;
+use crate::ComputeError;
 
 /// Largest coordinate, as a power of two: what the library leaves room for in its products of 64 bits.
 const COORDINATE_BITS: i32 = 30;
@@ -15,6 +16,12 @@ const COORDINATE_BITS: i32 = 30;
 const FINEST_BITS: i32 = 42;
 /// Edges beyond which the library cuts them at lines of longitude.
 const MOST_UNCUT: usize = 16_000;
+/// Most pieces that edges are cut into, of 40 bytes each, which the library holds all at once.
+const MOST_PIECES: f64 = 16e6;
+/// Most pairs of edges that are looked at one by one: some ten seconds.
+const MOST_PAIRS: f64 = 1e10;
+/// Edges of which every pair is looked at, to know of how many of all that would be.
+const SAMPLE: usize = 8192;
 /// Steps of the lattice that take as long as it takes to see whether two edges cross.
 const STEPS_A_PAIR: f64 = 4.0;
 
@@ -71,50 +78,115 @@ impl Lattice {
 
 /// What the subject's rings go round, less what the others go round: shapes of an outer ring, against the clock, and
 /// holes, with it. Corners in the middle of a straight line are left out ([`straightened`]).
-pub(super) fn difference(subject: &[IntContour], others: &[IntContour]) -> IntShapes {
+///
+/// # Errors
+/// `Region` where edges are so many and so long that it would take too long.
+pub(super) fn difference(
+    subject: &[IntContour],
+    others: &[IntContour],
+) -> Result<IntShapes, ComputeError> {
     // With the corners of straight lines in it, the library (4.5.2) makes points without an end of half of all regions that have some
     // along a coast, and of others areas that are 6 % too small.
     let options = IntOverlayOptions::keep_output_points();
-    let solver = solver(&[subject, others]);
+    let solver = solver(&[subject, others])?;
     let mut overlay = Overlay::with_contours_custom(subject, others, options, solver);
     let rule = if others.is_empty() {
         OverlayRule::Subject
     } else {
         OverlayRule::Difference
     };
-    overlay.overlay(rule, FillRule::NonZero)
+    Ok(overlay.overlay(rule, FillRule::NonZero))
 }
 
 /// How the library finds what crosses.
 ///
 /// Of very many edges it (4.5.2) cuts each at lines of longitude, and goes to the latitude of a cut by steps of the lattice, from a place that
 /// is the further off the longer the edge is: of one across the world up to 2²⁷ steps a cut, which together take seconds for each such edge.
-/// Where that is more work than to hold each edge against those that it meets in longitude, edges are taken as they are.
-fn solver(contours: &[&[IntContour]]) -> Solver {
+/// Where that is more work than to hold each edge against those that it meets in longitude, edges are taken as they are. So they are where they
+/// are cut into very many pieces (of a million edges across the world these would take 40 GB), and where very many lie between two cuts.
+///
+/// # Errors
+/// `Region` where neither can be done.
+fn solver(contours: &[&[IntContour]]) -> Result<Solver, ComputeError> {
     let edges = || {
         let contours = contours.iter().copied().flatten();
         contours.flat_map(|contour| contour.iter().zip(contour.iter().cycle().skip(1)))
     };
     let count = edges().count();
     if count <= MOST_UNCUT {
-        return Solver::default();
+        return Ok(Solver::default());
     }
     let ends = edges().fold([i32::MAX, i32::MIN], |[west, east], (from, _to)| {
         [west.min(from.x), east.max(from.x)]
     });
     let all_wide = f64::from(ends[0].abs_diff(ends[1])).max(1.0);
+    // It has so many parts of all longitudes at most, and half of them at least.
+    let parts = f64::from(count.ilog2() / 2 + 1).exp2();
+    let looks = looks(edges(), count, 2.0 * all_wide / parts);
     let count = count as f64;
-    let (mut steps, mut pairs) = (0.0, 0.0);
+    let (mut steps, mut pairs, mut pieces) = (0.0, 0.0, 0.0);
     for (from, to) in edges() {
         let share = f64::from(from.x.abs_diff(to.x)) / all_wide;
         steps += steps_to_a_cut(*from, *to) as f64 * (share * count.sqrt() + 1.0);
         pairs += share * count;
+        pieces += share * parts + 1.0;
     }
-    if steps > STEPS_A_PAIR * pairs {
-        Solver::LIST
-    } else {
-        Solver::default()
+    let is_cut = steps <= STEPS_A_PAIR * pairs && pieces <= MOST_PIECES;
+    if is_cut && looks.cut <= MOST_PAIRS {
+        return Ok(Solver::default());
     }
+    if looks.uncut > MOST_PAIRS {
+        let reason = format!(
+            "its {count} edges, and those of land in it, are so long that {:.1e} pairs of them lie in the same longitudes, and at most \
+             {MOST_PAIRS:.0e} are looked at; give fewer corners, or shorter edges",
+            looks.uncut
+        );
+        return Err(ComputeError::Region { reason });
+    }
+    Ok(Solver::LIST)
+}
+
+/// Pairs of edges that are looked at.
+struct Looks {
+    /// Of edges that are cut: those that meet in latitude and lie between the same two cuts, or nearly.
+    cut: f64,
+    /// Of edges as they are: those that meet in longitude.
+    uncut: f64,
+}
+
+/// How many pairs of some edges are looked at, by those of a sample; none where all pairs are not too many. Cuts are so far apart at most.
+fn looks<'a>(
+    edges: impl Iterator<Item = (&'a IntPoint, &'a IntPoint)>,
+    count: usize,
+    apart: f64,
+) -> Looks {
+    let mut looks = Looks {
+        cut: 0.0,
+        uncut: 0.0,
+    };
+    if (count as f64).powi(2) / 2.0 <= MOST_PAIRS {
+        return looks;
+    }
+    // An odd step comes by each side of teeth that have an even number of them.
+    let step = count.div_ceil(SAMPLE) | 1;
+    let bounds = |(from, to): (&IntPoint, &IntPoint)| {
+        let lons = [from.x.min(to.x), from.x.max(to.x)].map(f64::from);
+        (lons, [from.y.min(to.y), from.y.max(to.y)])
+    };
+    let some: Vec<([f64; 2], [i32; 2])> = edges.step_by(step).map(bounds).collect();
+    let (mut cut, mut uncut) = (0_u64, 0_u64);
+    for (at, (lons, lats)) in some.iter().enumerate() {
+        for (other_lons, other_lats) in &some[at + 1..] {
+            let between = (lons[0] - other_lons[1]).max(other_lons[0] - lons[1]);
+            let meet_in_latitude = lats[0] <= other_lats[1] && other_lats[0] <= lats[1];
+            uncut += u64::from(between <= 0.0);
+            cut += u64::from(meet_in_latitude && between < apart);
+        }
+    }
+    let of_all = (count as f64 / some.len() as f64).powi(2);
+    looks.cut = cut as f64 * of_all;
+    looks.uncut = uncut as f64 * of_all;
+    looks
 }
 
 /// Most steps that the library takes to the latitude of one cut of an edge.
@@ -198,7 +270,7 @@ mod tests {
         let (coast, few) = (contour(&short), contour(&short[..100]));
         let strategy = |subject: &IntContour, other: &IntContour| {
             let [subject, other] = [subject, other].map(std::slice::from_ref);
-            solver(&[subject, other]).strategy
+            solver(&[subject, other]).unwrap().strategy
         };
         assert_eq!(strategy(&diagonal, &coast), Strategy::List);
         assert_eq!(strategy(&coast, &diagonal), Strategy::List);
@@ -213,7 +285,33 @@ mod tests {
         let nested: Vec<_> = nested
             .map(|to| contour(&[[to, 0], [0, to], [-to, 0], [0, -to]]))
             .collect();
-        assert_eq!(solver(&[&nested, &[]]).strategy, Strategy::List);
-        assert_eq!(solver(&[&nested[..100], &[]]).strategy, Strategy::Auto);
+        let strategy = |all: &[IntContour]| solver(&[all, &[]]).unwrap().strategy;
+        assert_eq!(strategy(&nested), Strategy::List);
+        assert_eq!(strategy(&nested[..100]), Strategy::Auto);
+    }
+
+    #[test]
+    fn edges_are_not_cut_into_more_pieces_than_can_be_held() {
+        let half = 1 << 29;
+        // Edges across the world, to and fro, each a step further north.
+        let comb = |count: i32| {
+            let corner = |at: i32| [if at % 2 == 0 { -half } else { half }, at];
+            [contour(&(0..count).map(corner).collect::<Vec<_>>())]
+        };
+        let strategy = |all: &[IntContour]| solver(&[all, &[]]).map(|solver| solver.strategy);
+        assert_eq!(strategy(&comb(20_000)).unwrap(), Strategy::Auto);
+        assert_eq!(strategy(&comb(70_000)).unwrap(), Strategy::List);
+        let refused = strategy(&comb(200_000)).unwrap_err();
+        assert!(matches!(refused, ComputeError::Region { .. }), "{refused}");
+        assert!(refused.to_string().contains("fewer corners"), "{refused}");
+        // Upright teeth beside a long level edge, all of them between two cuts.
+        let mut teeth: Vec<[i32; 2]> = (0..300_000).map(|at| [at, at % 2 * half]).collect();
+        teeth.extend([[300_000, 0], [half, 0], [half, -1]]);
+        let teeth = [contour(&teeth)];
+        assert_eq!(strategy(&teeth).unwrap(), Strategy::List);
+        // A coast of a million short ones has few.
+        let coast: Vec<[i32; 2]> = (0..1_000_000).map(|at| [at, at % 2]).collect();
+        let coast = [contour(&coast)];
+        assert_eq!(strategy(&coast).unwrap(), Strategy::Auto);
     }
 }

@@ -109,6 +109,11 @@ impl Default for LoadedWeights {
 }
 
 impl LoadedWeights {
+    /// Those of a name, where they are held.
+    pub(crate) fn held(&self, name: &str) -> Option<Arc<RegionWeights>> {
+        self.held.get(name)
+    }
+
     /// Those at an address; many who ask at once wait for one reading.
     pub(crate) async fn get(
         &self,
@@ -161,10 +166,12 @@ mod tests {
         let loaded = LoadedWeights::default();
         let failing = async { Err(DataFusionError::Execution("away".into())) };
         assert!(loaded.get("a", failing).await.is_err());
+        assert!(loaded.held("a").is_none());
         let read = async { Ok(RegionWeights::new(vec![(1, vec![1.0])])) };
         loaded.get("a", read).await.unwrap();
         let never = async { panic!("read again") };
         assert!(loaded.get("a", never).await.unwrap().areas_m2(1).is_some());
+        assert!(loaded.held("a").unwrap().areas_m2(1).is_some());
     }
 
     #[tokio::test]

@@ -12,11 +12,14 @@ use super::area::integral_m2;
 use super::cut::TURNS_DEG;
 use super::ring::Ring;
 use crate::ComputeError;
+use crate::awaited::Awaited;
 
 /// Shares of a cell this close to none or all are none or all: rounding of sums over a row's edges.
 const SNAP: f64 = 1e-12;
 /// Shares of a cell beyond 0 and 1 by more than this cannot come from rings that count every place once.
 const SLACK: f64 = 1e-6;
+/// Edges between two looks whether anybody waits: some milliseconds.
+const EDGES_A_LOOK: usize = 1 << 14;
 
 /// Areas of the polygon's share of every cell of a band of rows, row-major over the whole width of the grid.
 pub(super) struct Band {
@@ -27,20 +30,29 @@ pub(super) struct Band {
 
 impl Band {
     /// The rows of a field's chunks that start at `first_row`.
+    ///
+    /// # Errors
+    /// Rings that cover a cell more than once, and `NotAwaited`.
     pub(super) fn new(
         rings: &[Ring],
         grid: &Grid,
         first_row: u32,
         earth: Earth,
+        awaited: &Awaited,
     ) -> Result<Self, ComputeError> {
+        awaited.check()?;
         let rows = CHUNK_ROWS.min(grid.rows - first_row);
         let mut cover = Cover::new(grid, first_row, rows, earth);
         for ring in rings {
             let (west, east) = ring.lon_range_deg();
             for turn in TURNS_DEG {
                 if west + turn < grid.east_deg() && east + turn > grid.west_deg {
-                    ring.edges()
-                        .for_each(|edge| cover.add_edge(edge.map(|[lon, lat]| [lon + turn, lat])));
+                    for (number, edge) in ring.edges().enumerate() {
+                        if number % EDGES_A_LOOK == 0 {
+                            awaited.check()?;
+                        }
+                        cover.add_edge(edge.map(|[lon, lat]| [lon + turn, lat]));
+                    }
                 }
             }
         }

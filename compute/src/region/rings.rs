@@ -9,6 +9,7 @@ use super::cut::WORLD_DEG;
 use super::ring::{Checked, Ring};
 use super::union::united;
 use crate::ComputeError;
+use crate::awaited::Awaited;
 
 /// Slack when angles are compared, degrees: a tenth of a millimetre.
 const SLACK_DEG: f64 = 1e-9;
@@ -27,6 +28,14 @@ const MIN_AREA_M2: f64 = 1e-6;
 /// No corner, corners that are no places, more than a million of them, edges that cross very often, a ring that is wider than the earth, or no
 /// area.
 pub(super) fn rings(region: &Region) -> Result<Vec<Ring>, ComputeError> {
+    rings_while(region, &Awaited::always())
+}
+
+/// The same for as long as it is awaited.
+///
+/// # Errors
+/// As [`rings`], and `NotAwaited`.
+pub(super) fn rings_while(region: &Region, awaited: &Awaited) -> Result<Vec<Ring>, ComputeError> {
     match region {
         Region::Global => {
             let [west, east] = WORLD_DEG;
@@ -40,13 +49,14 @@ pub(super) fn rings(region: &Region) -> Result<Vec<Ring>, ComputeError> {
         } => Ok(vec![Ring::rectangle([*west, *south, *east, *north])]),
         Region::Polygons(polygons) => {
             let polygons = checked(polygons)?;
+            awaited.check()?;
             if let Some(most) = crossings::too_many(&polygons) {
                 return Err(bad(format!(
                     "its edges cross more than {most} times, and at most so many crossings are resolved; give polygons whose \
                      edges do not cross, or fewer corners"
                 )));
             }
-            let rings = united(&polygons);
+            let rings = united(&polygons, awaited)?;
             let area_m2: f64 = rings
                 .iter()
                 .map(|ring| signed_area_m2(ring, Earth::Sphere))

@@ -5,9 +5,13 @@ use contract::land::LAND;
 use super::cut::{bounds_deg, inside, into_the_world};
 use super::lattice::{Lattice, difference};
 use super::ring::Ring;
+use crate::ComputeError;
 
 /// The rings of what is sea inside of some rings; none where all is land.
-pub(super) fn sea(rings: &[Ring]) -> Vec<Ring> {
+///
+/// # Errors
+/// `Region` where edges are too many and too long.
+pub(super) fn sea(rings: &[Ring]) -> Result<Vec<Ring>, ComputeError> {
     let rings: Vec<_> = rings
         .iter()
         .flat_map(|ring| into_the_world(ring.corners()))
@@ -21,7 +25,7 @@ pub(super) fn sea(rings: &[Ring]) -> Vec<Ring> {
         .map(|ring| lattice.contour(&inside(ring.clone(), bounds)))
         .filter(|contour| contour.len() >= 3)
         .collect();
-    lattice.rings(&difference(&subject, &land))
+    Ok(lattice.rings(&difference(&subject, &land)?))
 }
 
 fn meets([west, south, east, north]: [f64; 4], [w, s, e, n]: [f64; 4]) -> bool {
@@ -40,7 +44,8 @@ mod tests {
     fn sea_m2(region: &str) -> f64 {
         let region: Region = region.parse().unwrap();
         let area = |ring: &Ring| signed_area_m2(ring, Earth::Wgs84);
-        sea(&rings(&region).unwrap()).iter().map(area).sum()
+        let sea = sea(&rings(&region).unwrap()).unwrap();
+        sea.iter().map(area).sum()
     }
 
     /// The land's area found by shapely 2.2 (its union, cut into pieces of 0.01 degrees) and pyproj 3.7 (equal-area

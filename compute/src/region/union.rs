@@ -8,21 +8,27 @@ use super::area::signed_area_m2;
 use super::cut::{WORLD_DEG, bounds_deg, into_the_world};
 use super::lattice::{Lattice, difference, edges, straightened};
 use super::ring::{Checked, Ring};
+use crate::ComputeError;
+use crate::awaited::Awaited;
 
 /// The rings of the union of polygons.
 ///
 /// Polygons whose bounds meet are overlaid together, on a lattice as fine as they are small. Where the overlay changes
 /// no edge, the rings are taken as they were written, bit for bit.
-pub(super) fn united(polygons: &[Checked]) -> Vec<Ring> {
+///
+/// # Errors
+/// `Region` where edges are too many and too long; `NotAwaited`, asked before each overlay.
+pub(super) fn united(polygons: &[Checked], awaited: &Awaited) -> Result<Vec<Ring>, ComputeError> {
     let mut rings = vec![];
     for group in groups(polygons) {
+        awaited.check()?;
         let group: Vec<&Checked> = group.into_iter().map(|index| &polygons[index]).collect();
         let [west, _, east, _] =
             bounds_deg(group.iter().flat_map(|polygon| polygon.rings().flatten()));
         if east - west > 360.0 {
             // Parts may meet a turn apart: all are brought into the same longitudes.
             let cut: Vec<_> = group.iter().map(|polygon| in_the_world(polygon)).collect();
-            rings.extend(overlaid(&cut, None));
+            rings.extend(overlaid(&cut, None, awaited)?);
         } else {
             let parts: Vec<_> = group
                 .iter()
@@ -31,10 +37,10 @@ pub(super) fn united(polygons: &[Checked]) -> Vec<Ring> {
                     holes: polygon.holes.clone(),
                 })
                 .collect();
-            rings.extend(overlaid(&parts, Some(&group)));
+            rings.extend(overlaid(&parts, Some(&group), awaited)?);
         }
     }
-    rings
+    Ok(rings)
 }
 
 /// Step of the coarsest lattice that [`united`] brings corners to, of all polygons together or of any of them, degrees.
@@ -64,25 +70,31 @@ fn in_the_world(polygon: &Checked) -> Parts {
 }
 
 /// The union of polygons in one plane; `as_written` are they as rings, if they may be kept.
-fn overlaid(polygons: &[Parts], as_written: Option<&[&Checked]>) -> Vec<Ring> {
+fn overlaid(
+    polygons: &[Parts],
+    as_written: Option<&[&Checked]>,
+    awaited: &Awaited,
+) -> Result<Vec<Ring>, ComputeError> {
     let corners = polygons
         .iter()
         .flat_map(|polygon| polygon.outers.iter().chain(&polygon.holes).flatten());
     let lattice = Lattice::over(bounds_deg(corners));
     let (mut given, mut shapes) = (vec![], vec![]);
     for polygon in polygons {
+        awaited.check()?;
         let contours =
             |rings: &[Vec<[f64; 2]>]| rings.iter().map(|ring| lattice.contour(ring)).collect();
         let (outers, holes): (Vec<_>, Vec<_>) =
             (contours(&polygon.outers), contours(&polygon.holes));
-        shapes.extend(difference(&outers, &holes));
+        shapes.extend(difference(&outers, &holes)?);
         given.extend(outers.iter().chain(&holes).map(straightened));
     }
+    awaited.check()?;
     if polygons.len() > 1 {
         let contours: Vec<_> = shapes.into_iter().flatten().collect();
-        shapes = difference(&contours, &[]);
+        shapes = difference(&contours, &[])?;
     }
-    match as_written {
+    Ok(match as_written {
         Some(polygons) if edges(given.iter()) == edges(shapes.iter().flatten()) => {
             let rings = |polygon: &&Checked| {
                 let outer = turned(polygon.outer.clone(), true);
@@ -94,7 +106,7 @@ fn overlaid(polygons: &[Parts], as_written: Option<&[&Checked]>) -> Vec<Ring> {
             polygons.iter().flat_map(rings).collect()
         }
         _ => lattice.rings(&shapes),
-    }
+    })
 }
 
 /// A ring that runs against the clock, or with it.

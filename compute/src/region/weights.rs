@@ -14,10 +14,11 @@ use super::box_cover::{self, Bounds};
 use super::found::Found;
 use super::polygon_cover::Band;
 use super::ring::Ring;
-use super::rings::rings;
+use super::rings::rings_while;
 use super::sea::sea;
 use super::shares::{Shares, Weighing};
 use crate::ComputeError;
+use crate::awaited::Awaited;
 use crate::workshop::Workshop;
 
 /// Version of the way weights of boxes are computed: it changes when their bits do.
@@ -150,8 +151,9 @@ pub fn compute_of(
     surface: &Surface,
     shares: Option<&[f32]>,
 ) -> Result<Vec<(u32, Vec<f64>)>, ComputeError> {
-    let shared = shared_of(grid, region, earth, surface, shares)?.into_iter();
+    let shared = shared_of(grid, region, earth, surface, shares, &Awaited::always())?;
     Ok(shared
+        .into_iter()
         .map(|(chunk, areas_m2)| (chunk, areas_m2.to_vec()))
         .collect())
 }
@@ -159,27 +161,33 @@ pub fn compute_of(
 /// The same with equal chunks held once: of a box and of the open sea one a row of chunks.
 ///
 /// # Errors
-/// `Region` if they take more than may be held.
+/// `Region` if they take more than may be held; `NotAwaited`.
 pub(crate) fn shared_of(
     grid: &Grid,
     region: &Region,
     earth: Earth,
     surface: &Surface,
     shares: Option<&[f32]>,
+    awaited: &Awaited,
 ) -> Result<Vec<(u32, SharedAreas)>, ComputeError> {
     if let Surface::Shares(own) = surface {
         let values = shares.filter(|values| values.len() == grid.cell_count());
         let values = values.ok_or_else(|| {
             ComputeError::inconsistent(own.field.as_str(), "it was not read, or is of another grid")
         })?;
-        let all = shared_of(grid, region, earth, &Surface::All, None)?;
+        let all = shared_of(grid, region, earth, &Surface::All, None, awaited)?;
         return own.weigh(grid, &all, values);
     }
     let bounds = match region {
         _ if *surface == Surface::Ocean => {
-            return ring_chunks(grid, &sea(&rings(region)?), earth);
+            let rings = rings_while(region, awaited)?;
+            awaited.check()?;
+            return ring_chunks(grid, &sea(&rings)?, earth, awaited);
         }
-        Region::Polygons(_) => return ring_chunks(grid, &rings(region)?, earth),
+        Region::Polygons(_) => {
+            let rings = rings_while(region, awaited)?;
+            return ring_chunks(grid, &rings, earth, awaited);
+        }
         Region::Global => Bounds::global(grid),
         Region::Box {
             west,
@@ -195,6 +203,7 @@ pub(crate) fn shared_of(
     };
     let mut found = Found::default();
     for (chunk, window) in field_chunks(grid).into_iter().enumerate() {
+        awaited.check()?;
         let areas_m2 = box_cover::areas_m2(bounds, grid, window, earth);
         found.add(chunk as u32, &areas_m2)?;
     }
@@ -203,7 +212,8 @@ pub(crate) fn shared_of(
 
 /// Has a region any area on a grid?
 pub(crate) fn covers(grid: &Grid, region: &Region, earth: Earth) -> Result<bool, ComputeError> {
-    let shared = shared_of(grid, region, earth, &Surface::All, None)?;
+    let awaited = &Awaited::always();
+    let shared = shared_of(grid, region, earth, &Surface::All, None, awaited)?;
     Ok(!shared.is_empty())
 }
 
@@ -212,6 +222,7 @@ fn ring_chunks(
     grid: &Grid,
     rings: &[Ring],
     earth: Earth,
+    awaited: &Awaited,
 ) -> Result<Vec<(u32, SharedAreas)>, ComputeError> {
     let mut found = Found::default();
     let mut band = None;
@@ -219,7 +230,7 @@ fn ring_chunks(
         debug_assert_eq!(window.row % CHUNK_ROWS, 0, "chunks start at band rows");
         let current = match band.take() {
             Some((row, current)) if row == window.row => current,
-            _ => Band::new(rings, grid, window.row, earth)?,
+            _ => Band::new(rings, grid, window.row, earth, awaited)?,
         };
         found.add(chunk as u32, &current.window(window))?;
         band = Some((window.row, current));
@@ -337,7 +348,9 @@ async fn weighed(
         own => own.clone(),
     };
     let (own, region) = (*grid, region.clone());
-    let cover = move || shared_of(&own, &region, earth, &covered, None);
+    // It is stored, for whoever asks next too.
+    let awaited = Awaited::always();
+    let cover = move || shared_of(&own, &region, earth, &covered, None, &awaited);
     let chunks = tokio::task::spawn_blocking(cover)
         .await
         .map_err(|e| ComputeError::inconsistent("weights", e))??;

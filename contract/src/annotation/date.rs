@@ -29,13 +29,15 @@ impl DateLabel {
         let statistic = product.computed.as_ref().and_then(over_time);
         let is_sum = product.quantity == Quantity::AccumulatedCarbon;
         let accumulated = is_sum && statistic.is_none();
-        let adjective = period.adjective();
+        let mean_over = period
+            .adjective()
+            .filter(|_length| may_be_means(product.quantity));
         let (shown, note) = match product.steps.as_slice() {
             // There is one picture, whatever the instant.
             [_only] if !accumulated => {
                 let note = match statistic {
                     None | Some(MapStatistic::Mean) => {
-                        adjective.map(|length| format!("{length} mean"))
+                        mean_over.map(|length| format!("{length} mean"))
                     }
                     Some(other) => of_all_time(other),
                 };
@@ -58,7 +60,7 @@ impl DateLabel {
                         let of = |base| format!("climatology of {base}");
                         Some(base.map_or_else(|| "climatology".to_owned(), of))
                     }
-                    (false, _) => adjective.map(|length| format!("{length} means")),
+                    (false, _) => mean_over.map(|length| format!("{length} means")),
                 };
                 (day, note)
             }
@@ -68,6 +70,15 @@ impl DateLabel {
             note: note.and_then(|note| Label::cut(&note)),
         })
     }
+}
+
+/// May values of a step be means over it? Codes have none, and heights and shares of land hold at any time.
+fn may_be_means(quantity: Quantity) -> bool {
+    let holds_at_any_time = matches!(
+        quantity,
+        Quantity::Elevation | Quantity::SeaAreaFraction | Quantity::LandAreaFraction
+    );
+    quantity.flags().is_empty() && !quantity.is_day_of_year() && !holds_at_any_time
 }
 
 /// The statistic over time that the values are, of one product or of two.

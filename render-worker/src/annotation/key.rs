@@ -2,10 +2,11 @@
 
 use contract::annotation::DateLabel;
 use contract::colour::TransferFunction;
+use contract::isolines::Isolines;
 use contract::job::RenderJob;
-use contract::quantity::Quantity;
+use contract::quantity::{Display, Quantity};
 use legend::svg::{Bar, write_bar};
-use legend::{Legend, LegendError};
+use legend::{Legend, LegendError, ticks};
 
 use super::page::{Corner, Page};
 use super::panel::Panel;
@@ -20,8 +21,10 @@ const BAR_LIMITS_EM: [f64; 2] = [15.0, 24.0];
 const TITLE_EM: f64 = 1.0;
 const SMALL_EM: f64 = 0.8;
 const DATE_EM: f64 = 1.45;
+/// Height of a line of small text below the marks of a bar, letters.
+const ROW_EM: f64 = 1.25;
 
-/// The legend of a job's colours.
+/// The legend of a job's colours, and of its isolines.
 pub(super) fn draw(
     page: &mut Page,
     job: &RenderJob,
@@ -35,13 +38,19 @@ pub(super) fn draw(
     let unit_width = width(legend.unit(), small, Ink::Soft)?;
     let [least, most] = BAR_LIMITS_EM.map(|limit| limit * em);
     let wanted = (page.size()[0] * BAR_SHARE).clamp(least, most);
-    let across = wanted.max(label_width + 1.5 * em + unit_width);
+    let isolines = job.style.context.isolines;
+    let isolines = isolines.map(|lines| isolines_in_words(lines, quantity.display()));
+    let isolines_width = width(isolines.as_deref().unwrap_or_default(), small, Ink::Panel)?;
+    let across = wanted
+        .max(label_width + 1.5 * em + unit_width)
+        .max(isolines_width);
     let ends = quantity
         .ends()
         .filter(|_| transfer.low < 0.0 || transfer.high > 0.0);
     let (bar_top, bar_height) = (padding + 1.75 * em, 0.8 * em);
     let foot = bar_top + bar_height;
-    let height = foot + 1.3 * em + if ends.is_some() { 1.25 * em } else { 0.0 } + 0.75 * padding;
+    let rows = f64::from(u8::from(ends.is_some()) + u8::from(isolines.is_some()));
+    let height = foot + 1.3 * em + ROW_EM * em * rows + 0.75 * padding;
     let corners = [
         Corner::BottomLeft,
         Corner::BottomRight,
@@ -73,12 +82,28 @@ pub(super) fn draw(
     write_bar(&legend, bar, &mut colours).expect("a string takes any text");
     panel.push(&colours);
     write_marks(&mut panel, &legend, [padding, foot], across, em)?;
+    let mut y = foot + 2.45 * em;
     if let Some(ends) = ends {
-        let y = foot + 2.45 * em;
         write_ends(&mut panel, transfer, ends, [padding, right], y, small);
+        y += ROW_EM * em;
+    }
+    if let Some(isolines) = &isolines {
+        panel.write(isolines, [padding, y], small, Anchor::Start, Ink::Panel);
     }
     panel.put(page);
     Ok(())
+}
+
+/// Which values have a line, in the unit of the legend.
+fn isolines_in_words(isolines: Isolines, display: Display) -> String {
+    match isolines {
+        Isolines::Every { step, .. } => {
+            let step = ticks::texts(&[step * display.factor.abs()]).concat();
+            let words = format!("Isolines every {step} {}", display.unit);
+            words.trim_end().to_owned()
+        }
+        Isolines::Decades { .. } => "Isolines at 1 and 3 of every power of ten".to_owned(),
+    }
 }
 
 /// Round values below a bar that begins at a place of the panel.
@@ -166,4 +191,91 @@ pub(super) fn draw_date(page: &mut Page, date: &DateLabel) -> Result<(), LegendE
     );
     panel.put(page);
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use contract::annotation::Annotations;
+    use contract::camera::CameraAngles;
+    use contract::isolines::IsolineWish;
+    use contract::job::View;
+    use legend::raster;
+    use render_proof::ocean;
+
+    use super::*;
+
+    /// The key of a quantity in its usual colours, with isolines as they are asked for.
+    fn key(quantity: Quantity, isolines: Option<&str>, [width_px, height_px]: [u32; 2]) -> String {
+        let view = View::Globe {
+            lon_deg: -150.0,
+            lat_deg: 10.0,
+            height_m: 1.5e7,
+            width_px,
+            height_px,
+            angles: CameraAngles::NADIR,
+        };
+        let mut job = ocean::job(view);
+        job.style.transfer = TransferFunction::default_for(quantity);
+        job.style.context.isolines = isolines.map(|wish| {
+            let wish: IsolineWish = wish.parse().unwrap();
+            wish.within(quantity, &job.style.transfer).unwrap()
+        });
+        job.annotations = Some(Annotations {
+            legend: Some(quantity),
+            ..Annotations::none()
+        });
+        job.validate().unwrap();
+        let mut page = Page::new([width_px, height_px]);
+        draw(&mut page, &job, quantity).unwrap();
+        page.into_svg()
+    }
+
+    #[test]
+    fn isolines_are_told_in_the_words_and_the_unit_of_the_legend() {
+        let told = |quantity, isolines| {
+            let svg = key(quantity, Some(isolines), [1600, 900]);
+            let (_, told) = svg.split_once(">Isolines ").unwrap();
+            told.split_once('<').unwrap().0.to_owned()
+        };
+        assert_eq!(told(Quantity::Pco2, "20"), "every 20 µatm");
+        assert_eq!(told(Quantity::CarbonFlux, "10"), "every 10 g C m⁻² yr⁻¹");
+        assert_eq!(told(Quantity::CarbonFlux, "auto"), "every 10 g C m⁻² yr⁻¹");
+        assert_eq!(told(Quantity::SeaSurfaceTemperature, "2.5"), "every 2.5 °C");
+        assert_eq!(told(Quantity::Salinity, "0.5"), "every 0.5");
+        assert_eq!(
+            told(Quantity::Chlorophyll, "auto"),
+            "at 1 and 3 of every power of ten"
+        );
+        for quantity in Quantity::ALL {
+            assert!(!key(quantity, None, [1600, 900]).contains("Isolines"));
+        }
+    }
+
+    #[test]
+    fn what_is_told_of_isolines_has_a_line_of_its_own_in_the_panel() {
+        for quantity in [Quantity::CarbonFlux, Quantity::Chlorophyll] {
+            for size in [[1600, 900], [640, 360], [4096, 4096]] {
+                let svg = key(quantity, Some("auto"), size);
+                // The panel is the first rectangle, what is told of isolines the last text.
+                let (_, panel) = svg.split_once("<rect ").unwrap();
+                let number = |name: &str| -> f64 {
+                    let (_, rest) = panel.split_once(&format!("{name}=\"")).unwrap();
+                    rest.split('"').next().unwrap().parse().unwrap()
+                };
+                let (right, bottom) = (
+                    number("x") + number("width"),
+                    number("y") + number("height"),
+                );
+                let boxes = raster::text_boxes(&svg).unwrap();
+                let ([left, top, own_right, own_bottom], others) = boxes.split_last().unwrap();
+                assert!(
+                    *left >= number("x") && *own_right <= right && *own_bottom <= bottom,
+                    "{svg}"
+                );
+                // Boxes are as high as the highest letters of a font.
+                let core = top + 0.3 * (own_bottom - top);
+                assert!(others.iter().all(|other| other[3] <= core), "{svg}");
+            }
+        }
+    }
 }

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use axum::body::Body;
 use axum::extract::{Request, State};
-use axum::http::{HeaderValue, Method, StatusCode, header};
+use axum::http::{HeaderMap, HeaderValue, Method, StatusCode, header};
 use axum::response::{Html, IntoResponse as _, Response};
 use tower_http::services::ServeDir;
 
@@ -47,12 +47,15 @@ fn index(settings: &Settings) -> Option<PathBuf> {
 /// A file of the viewer; everything that is none is an unknown address.
 pub(crate) async fn get(
     State(state): State<AppState>,
-    request: Request,
+    mut request: Request,
 ) -> Result<Response, ServerError> {
     if !matches!(*request.method(), Method::GET | Method::HEAD) {
         return Err(ServerError::ReadOnly);
     }
     let path = request.uri().path().to_owned();
+    if !asks_for_a_part(&request) {
+        request.headers_mut().remove(header::RANGE);
+    }
     let Some(folder) = &state.settings.viewer else {
         return absent(&path);
     };
@@ -63,6 +66,14 @@ pub(crate) async fn get(
         .await;
     let mut response = match found {
         Ok(response) if response.status() == StatusCode::NOT_FOUND => return absent(&path),
+        // The service says neither in words.
+        Ok(response) if response.status() == StatusCode::RANGE_NOT_SATISFIABLE => {
+            let length = length_of(response.headers()).unwrap_or_default();
+            return Err(ServerError::NoRange { length });
+        }
+        Ok(response) if response.status() == StatusCode::PRECONDITION_FAILED => {
+            return Err(ServerError::Changed);
+        }
         Ok(response) => response.map(Body::new),
         Err(error) => {
             tracing::debug!(%error, "a file of the viewer cannot be read");
@@ -83,6 +94,19 @@ pub(crate) async fn get(
         );
     }
     Ok(response)
+}
+
+/// Is it one range of bytes? To HEAD none means anything, and several may be answered with all (RFC 9110, 14.2).
+fn asks_for_a_part(request: &Request) -> bool {
+    let is_one = |range: &HeaderValue| !range.as_bytes().contains(&b',');
+    let range = request.headers().get(header::RANGE);
+    request.method() == Method::GET && range.is_none_or(is_one)
+}
+
+/// How many bytes there are, by an answer that has none of them.
+fn length_of(headers: &HeaderMap) -> Option<u64> {
+    let place = headers.get(header::CONTENT_RANGE)?.to_str().ok()?;
+    place.strip_prefix("bytes */")?.parse().ok()
 }
 
 fn absent(path: &str) -> Result<Response, ServerError> {

@@ -1,6 +1,7 @@
 //! The viewer's files.
 
-use axum::http::StatusCode;
+use axum::body::Body;
+use axum::http::{Request, StatusCode, header};
 
 use crate::app::TestApp;
 
@@ -135,6 +136,33 @@ async fn text_is_compressed_and_pictures_are_not() {
             .header("content-encoding"),
         ""
     );
+}
+
+#[tokio::test]
+async fn parts_of_a_file_and_why_there_are_none_are_told_as_elsewhere() {
+    let (_folder, app) = with_viewer().await;
+    let part = app
+        .get_with("/favicon.svg", &[("range", "bytes=1-3")])
+        .await;
+    assert_eq!(part.status, StatusCode::PARTIAL_CONTENT);
+    assert_eq!(part.text(), "svg");
+    let beyond = [("range", "bytes=6-")];
+    let beyond = app.get_with("/favicon.svg", &beyond).await;
+    assert_eq!(beyond.status, StatusCode::RANGE_NOT_SATISFIABLE);
+    assert_eq!(beyond.header("content-range"), "bytes */6");
+    assert!(beyond.reason().contains("6 bytes"), "{}", beyond.reason());
+    // Several may be answered with all, and to HEAD none means anything.
+    let several = [("range", "bytes=0-1,3-4")];
+    let several = app.get_with("/favicon.svg", &several).await;
+    assert_eq!(several.status, StatusCode::OK);
+    assert_eq!(several.text(), "<svg/>");
+    let head = Request::head("/favicon.svg").header(header::RANGE, "bytes=6-");
+    let head = app.send(head.body(Body::empty()).unwrap()).await;
+    assert_eq!(head.status, StatusCode::OK);
+    let other = [("if-match", "\"another\"")];
+    let other = app.get_with("/favicon.svg", &other).await;
+    assert_eq!(other.status, StatusCode::PRECONDITION_FAILED);
+    assert!(other.reason().contains("If-Match"), "{}", other.reason());
 }
 
 #[tokio::test]

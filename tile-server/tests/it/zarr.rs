@@ -117,6 +117,8 @@ async fn parts_are_those_of_the_whole_and_copies_are_known_again() {
     let beyond = format!("bytes={length}-");
     let beyond = app.get_with(path, &[("range", &beyond)]).await;
     assert_eq!(beyond.status, StatusCode::RANGE_NOT_SATISFIABLE);
+    let all = format!("bytes */{}", whole.body.len());
+    assert_eq!(beyond.header("content-range"), all);
     let tag = whole.headers[header::ETAG].to_str().unwrap();
     let again = app.get_with(path, &[("if-none-match", tag)]).await;
     assert_eq!(

@@ -23,8 +23,8 @@ pub(in crate::reduce) fn question() -> Question {
     Question {
         version: version(),
         shape: [16, 16],
-        whole: "computed:{'quoted'}".to_owned(),
-        covered: "computed:{}".to_owned(),
+        whole: "computed:{'quoted'}".into(),
+        covered: "computed:{}".into(),
         unit: WeightUnit::default(),
         scale: Scale::of_all(),
         wanted: Wanted::Sums {

@@ -350,7 +350,8 @@ async fn shares_of_a_product_give_the_same_weights_in_bands_of_any_size() {
     for of in ["land", "sea"] {
         let shares = serde_json::json!({ "frame": field, "of": of });
         let surface = Surface::Shares(serde_json::from_value(shares).unwrap());
-        let whole = shared_of(&PACIFIC, &region, Earth::Wgs84, &surface, Some(&values)).unwrap();
+        let (shares, awaited) = (Some(&values[..]), &Awaited::always());
+        let whole = shared_of(&PACIFIC, &region, Earth::Wgs84, &surface, shares, awaited).unwrap();
         assert!(whole.len() > 4, "{}", whole.len());
         for band_cells in [1, 1 << 30] {
             let workshop = Workshop {
@@ -361,6 +362,36 @@ async fn shares_of_a_product_give_the_same_weights_in_bands_of_any_size() {
             assert_eq!(found.unwrap(), whole, "{of} {band_cells}");
         }
     }
+}
+
+#[test]
+fn weights_that_nobody_waits_for_are_not_computed_to_their_end() {
+    let triangle = polygon(&[[170.0, -20.0], [190.0, -22.0], [181.0, 15.0]], vec![]);
+    let never = Awaited::never();
+    let is_left = |ended: Result<(), ComputeError>| matches!(ended, Err(ComputeError::NotAwaited));
+    for region in [
+        triangle.clone(),
+        Region::Global,
+        "150,-20,200,20".parse().unwrap(),
+    ] {
+        for surface in [Surface::All, Surface::Ocean] {
+            let of = |awaited: &Awaited| {
+                let found = shared_of(&PACIFIC, &region, Earth::Wgs84, &surface, None, awaited);
+                found.map(drop)
+            };
+            assert!(is_left(of(&never)), "{region:?} {surface:?}");
+            of(&Awaited::always()).unwrap();
+        }
+    }
+    // Each of the loops asks, and not the first of them alone.
+    assert!(is_left(rings_while(&triangle, &never).map(drop)));
+    let rings = rings_while(&triangle, &Awaited::always()).unwrap();
+    let band = |awaited: &Awaited| Band::new(&rings, &PACIFIC, 0, Earth::Wgs84, awaited).map(drop);
+    assert!(is_left(band(&never)));
+    band(&Awaited::always()).unwrap();
+    let chunks = |awaited: &Awaited| ring_chunks(&PACIFIC, &rings, Earth::Wgs84, awaited).map(drop);
+    assert!(is_left(chunks(&never)));
+    chunks(&Awaited::always()).unwrap();
 }
 
 #[test]

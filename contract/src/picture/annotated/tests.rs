@@ -9,7 +9,7 @@ use crate::key::ObjectKey;
 use crate::manifest::{MANIFEST_SCHEMA, Step};
 use crate::picture::{PictureOptions, PictureRequest};
 use crate::product::ProductId;
-use crate::quantity::Quantity;
+use crate::quantity::{Flag, OpenQuantity, OpenWords, Quantity};
 use crate::time::{Period, TimeStep};
 
 const GLOBE: View = View::Globe {
@@ -89,7 +89,7 @@ fn what_is_asked_for_is_there_and_nothing_else() {
     let text = serde_json::to_string(&date).unwrap();
     assert_eq!(
         text,
-        r#"{"version":4,"date":{"shown":"15 July 2000","note":"monthly means"}}"#
+        r#"{"version":5,"date":{"shown":"15 July 2000","note":"monthly means"}}"#
     );
     let plain = PictureRequest {
         mode: Mode::Map,
@@ -170,6 +170,44 @@ fn a_product_of_one_step_is_named_by_it() {
         label(Quantity::WindSpeed, six),
         "15 July 2000, 18:00 UTC | 6-hour means"
     );
+}
+
+#[test]
+fn what_has_no_mean_over_time_is_not_called_one() {
+    let note = |quantity, periods: Vec<Period>| {
+        let product = product("p", quantity, periods);
+        let label = DateLabel::of(&product, "2008-07-15T18:00:00Z".parse().unwrap()).unwrap();
+        label.note.map(String::from)
+    };
+    let words = OpenWords {
+        name: "basin".to_owned(),
+        unit: "1".to_owned(),
+        title: "Basin".to_owned(),
+        range: None,
+        flags: vec![Flag {
+            value: 3,
+            meaning: "pacific".to_owned(),
+        }],
+        is_standard_name: false,
+    };
+    let codes = Quantity::Open(OpenQuantity::new(words).unwrap());
+    let crest = Quantity::open("sst_annual_phase", "day", "Day of the crest").unwrap();
+    assert!(crest.is_day_of_year());
+    let of_no_time = [
+        codes,
+        crest,
+        Quantity::Elevation,
+        Quantity::LandAreaFraction,
+        Quantity::SeaAreaFraction,
+    ];
+    for quantity in of_no_time {
+        let year = vec![Period::year(2008).unwrap()];
+        assert_eq!(note(quantity, year), None, "{}", quantity.word());
+        assert_eq!(note(quantity, months()), None, "{}", quantity.word());
+    }
+    let measured = Quantity::open("dust", "kg m-2", "Dust").unwrap();
+    let year = vec![Period::year(2008).unwrap()];
+    assert_eq!(note(measured, year).as_deref(), Some("yearly mean"));
 }
 
 #[test]
