@@ -24,7 +24,7 @@ use crate::publish::{IsStillAsked, MADE_AGAIN};
 use crate::summed::has_budget;
 use crate::{ComputeError, Engine, catalogue};
 pub use behind::behind;
-pub use mend::mend;
+pub use mend::{mend, to_mend};
 use order::Order;
 use recipe::Recipe;
 pub use recipe::why_it_stays;

@@ -241,6 +241,7 @@ mod tests {
             place: "s3://b/x array sst".to_owned(),
             reason: "the store has changed since it was attached".to_owned(),
             cause: Cause::Content,
+            folder: None,
         };
         failure.into()
     }

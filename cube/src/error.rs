@@ -7,6 +7,12 @@ use storage::StorageError;
 /// in which it cannot be told otherwise.
 pub(crate) const MAY_PASS: &str = "the store fails at the moment";
 
+/// What Icechunk says of clocks: states are in the order of their times, and those are times of the store.
+const OF_CLOCKS: [&str; 2] = [
+    "invalid snapshot timestamp ordering",
+    "verify if the machine clock has drifted",
+];
+
 /// A cube that cannot be read or written.
 #[derive(Debug, thiserror::Error)]
 pub enum CubeError {
@@ -81,6 +87,11 @@ pub enum CubeError {
     /// Others were faster every time.
     #[error("{place} was changed by others in each of {attempts} attempts to commit: try again")]
     Contended { place: String, attempts: u32 },
+    /// By this machine's clock nothing can be committed: it is behind the newest state, or far from the clock of the store.
+    #[error(
+        "nothing can be committed to {place}: {reason}; set this machine's clock right, or that of the store, and do the same again"
+    )]
+    Clock { place: String, reason: String },
     /// The library of the repository or of the arrays failed.
     #[error("{place}: {doing}: {reason}")]
     Library {
@@ -106,23 +117,31 @@ impl CubeError {
             | Self::Overlap { .. }
             | Self::Shape { .. }
             | Self::Outside { .. }
+            | Self::Clock { .. }
             | Self::Library { .. } => false,
         }
     }
 
     /// A failure of the libraries, without the trace of spans that Icechunk's errors carry behind their first lines; of the store behind them, if
-    /// that is what failed and may pass. So are the next two.
+    /// that is what failed and may pass. So are the next two. Of clocks, if those are why nothing is committed.
     pub(crate) fn library(
         place: &str,
         doing: &'static str,
         reason: impl std::fmt::Display,
     ) -> Self {
         let reason = first_lines(&reason);
-        Self::away(&reason, || format!("{place}: {doing}")).unwrap_or_else(|| Self::Library {
-            place: place.to_owned(),
+        if let Some(away) = Self::away(&reason, || format!("{place}: {doing}")) {
+            return away;
+        }
+        let place = place.to_owned();
+        if OF_CLOCKS.iter().any(|text| reason.contains(text)) {
+            return Self::Clock { place, reason };
+        }
+        Self::Library {
+            place,
             doing,
             reason,
-        })
+        }
     }
 
     /// A chunk that cannot be read.
@@ -164,6 +183,10 @@ pub(crate) fn first_lines(error: &dyn std::fmt::Display) -> String {
 
 #[cfg(test)]
 mod tests {
+    use chrono::DateTime;
+    use icechunk::format::IcechunkFormatErrorKind;
+    use icechunk::session::SessionErrorKind;
+
     use super::*;
 
     #[test]
@@ -187,6 +210,29 @@ mod tests {
         }
         for error in all("the checksum differs") {
             assert!(!error.is_retryable(), "{error}");
+        }
+    }
+
+    #[test]
+    fn what_icechunk_refuses_for_the_clock_says_what_to_do() {
+        let [parent, child] = [1_000, 0].map(|s| DateTime::from_timestamp(s, 0).unwrap());
+        let all = [
+            SessionErrorKind::InvalidSnapshotTimestampOrdering { parent, child }.to_string(),
+            SessionErrorKind::InvalidSnapshotTimestamp {
+                object_store_time: parent,
+                snapshot_time: child,
+            }
+            .to_string(),
+            IcechunkFormatErrorKind::InvalidUpdateTimestamp {
+                latest_time: parent,
+                new_time: child,
+            }
+            .to_string(),
+        ];
+        for reason in all {
+            let error = CubeError::library("s3://b/p", "committing", reason);
+            assert!(matches!(error, CubeError::Clock { .. }), "{error:?}");
+            assert!(error.to_string().contains("set this machine's clock right"));
         }
     }
 }

@@ -13,6 +13,7 @@ mod bands;
 mod blocks;
 pub mod cf;
 pub mod clean_up;
+mod clocks;
 mod compact;
 mod complete;
 mod description;

@@ -3,11 +3,13 @@
 //!
 //! Objects themselves are compared with their checksums and seals by `storage::verify`, as those of all kinds are.
 
+mod mend;
+
 use std::collections::{BTreeMap, BTreeSet};
 
 use contract::key::ObjectKey;
 use contract::kind::Kind;
-use contract::manifest::{Manifest, ManifestId};
+use contract::manifest::ManifestId;
 use contract::product::ProductId;
 use futures::TryStreamExt as _;
 use futures::future::BoxFuture;
@@ -18,6 +20,7 @@ use storage::{StorageError, Store, manifests};
 use crate::follow::folder;
 use crate::object_storage::is_initial;
 use crate::{At, Cube, CubeError, Repository, Step, compact, complete, series};
+pub use mend::{Mending, mend, mending};
 
 /// What a cube was found to be.
 #[derive(Debug, Clone, Default)]
@@ -308,86 +311,4 @@ impl Check<'_> {
         }
         Ok(broken)
     }
-}
-
-/// Brings the cube of a product to its newest version, whatever became of it: one that is damaged is made again from the
-/// versions that are there. True if it was made again.
-///
-/// One that others bring to a newer version meanwhile is left as it is.
-///
-/// # Errors
-/// The store does not answer: a sound cube is as it was, another one is made by the next call. A field that the cube is made of is damaged or
-/// gone.
-pub fn mend<'a>(
-    store: &'a Store,
-    product: &'a ProductId,
-) -> BoxFuture<'a, Result<bool, CubeError>> {
-    Box::pin(async move {
-        let folder = folder(product);
-        let keys = store.list(&folder).await?;
-        let damaged = storage::verify::damaged(store, keys.iter().cloned()).await?;
-        let mut is_whole = damaged.is_empty();
-        if is_whole && !keys.is_empty() {
-            let checked = check(store, product, &damaged).await?;
-            let mut faults = checked.findings.iter().map(|finding| finding.fault);
-            is_whole = faults.all(|fault| fault == Fault::Behind);
-        }
-        let Some(newest) = manifests::latest(store, product).await? else {
-            return Ok(false);
-        };
-        // It has no cube, and what there may be of before is nothing's of now.
-        if store.attached_to(&newest).await?.is_some() {
-            return Ok(false);
-        }
-        if is_whole && follows(store, &newest).await? {
-            compact::compact(store, &folder).await?;
-            return Ok(false);
-        }
-        remove(store, keys, &folder).await?;
-        // Asked for now: others may have published meanwhile, and their version was in the cube that is gone.
-        for number in manifests::numbers(store, product).await? {
-            if let Some(manifest) = manifests::numbered(store, product, number).await? {
-                crate::follow(store, &manifest).await?;
-            }
-        }
-        compact::compact(store, &folder).await?;
-        Ok(true)
-    })
-}
-
-/// Brings a sound cube to the newest version of its product; false if it is of one that is no more, or cannot be brought there.
-///
-/// # Errors
-/// What says nothing of the cube: a store that does not answer, a field that is damaged or gone.
-async fn follows(store: &Store, newest: &Manifest) -> Result<bool, CubeError> {
-    let followed = match crate::follow(store, newest).await {
-        Ok(followed) => followed.version,
-        // Nor would what is made again: the store fails, or what the newest version is made of is damaged.
-        Err(error) if error.is_retryable() || matches!(error, CubeError::Storage(_)) => {
-            return Err(error);
-        }
-        Err(error) => {
-            tracing::warn!(%error, "a cube cannot follow, and is made again");
-            return Ok(false);
-        }
-    };
-    if followed == newest.id() {
-        return Ok(true);
-    }
-    // Of a newer version: others have published meanwhile, or somebody took the newest manifest away.
-    let there = manifests::numbered(store, &followed.product, followed.number).await?;
-    Ok(there.is_some_and(|there| there.id() == followed))
-}
-
-/// Removes the objects of a cube. What says where all else is goes last: until then others find a damaged cube, and none that they may add to.
-async fn remove(store: &Store, keys: Vec<ObjectKey>, folder: &str) -> Result<(), CubeError> {
-    let entry = format!("{folder}/repo");
-    // A Hadoop file system has it in a folder beside it.
-    let is_entry =
-        |key: &ObjectKey| key.as_str() == entry || key.is_in(&format!("{entry}.numbers"));
-    let (last, first): (Vec<_>, Vec<_>) = keys.into_iter().partition(is_entry);
-    for key in first.iter().chain(&last) {
-        store.remove(key).await?;
-    }
-    Ok(())
 }

@@ -10,6 +10,7 @@ mod derived;
 mod export;
 mod fill;
 mod flight_sql;
+mod follow;
 mod ground;
 mod landing;
 mod look;
@@ -565,6 +566,39 @@ mod tests {
         let (own, shared) = help.split_once("Options of every command:").unwrap();
         assert!(own.contains("--json") && !own.contains("--data"), "{help}");
         assert!(shared.contains("--data") && !shared.contains("--json"));
+    }
+
+    #[test]
+    fn where_a_period_is_asked_for_it_is_said_how_steps_across_its_ends_count() {
+        let mut program = Cli::command();
+        program.build();
+        for (words, asked) in [
+            ("stats point", "from"),
+            ("stats line", "from"),
+            ("stats polygon", "from"),
+            ("stats correlate", "from"),
+            ("stats difference", "period"),
+            ("stats difference", "minus_period"),
+            ("stats hovmoller", "from"),
+            ("budget", "from"),
+            ("derive", "from"),
+            ("derive co2-flux", "from"),
+            ("derive regrid", "from"),
+            ("derive statistic", "from"),
+            ("derive accumulated", "start"),
+        ] {
+            let command = words.split(' ').fold(&program, |command, name| {
+                command.find_subcommand(name).unwrap()
+            });
+            let mut all = command.get_arguments();
+            let help = all.find(|one| one.get_id() == asked).unwrap().get_help();
+            let help = help.unwrap().to_string().to_lowercase();
+            let is_said = ["count", "is computed, and whole"];
+            assert!(
+                is_said.iter().any(|it| help.contains(it)),
+                "{words}: {help}"
+            );
+        }
     }
 
     #[test]

@@ -149,6 +149,7 @@ mod tests {
             place: "/data/sst.zarr array sst chunk [0, 0, 0]".to_owned(),
             reason: "is damaged".to_owned(),
             cause: storage::attached::Cause::Content,
+            folder: Some("/data/sst.zarr".to_owned()),
         };
         let text = failure.to_string();
         let error = storage::StorageError::Object {

@@ -280,7 +280,17 @@ fn fleet_failed(error: &FleetError) -> BackendError {
 /// What of a failure is to be told that came from a store of others, where that lasts: it is neither the asker's fault nor ours.
 fn upstream(error: &(dyn Error + 'static)) -> Option<BackendError> {
     let failure = Failure::behind(error).filter(|failure| !failure.is_retryable())?;
-    Some(BackendError::new(Class::Upstream, failure.to_string()))
+    let text = failure.for_strangers(&failure.to_string());
+    Some(BackendError::new(Class::Upstream, text))
+}
+
+/// The text of a failure for who asks over HTTP; the log has all of it.
+fn for_strangers(error: &(dyn Error + 'static)) -> String {
+    let text = error.to_string();
+    match Failure::behind(error) {
+        Some(failure) => failure.for_strangers(&text),
+        None => text,
+    }
 }
 
 fn compute_failed(error: ComputeError) -> BackendError {
@@ -293,14 +303,14 @@ fn compute_failed(error: ComputeError) -> BackendError {
         ErrorClass::Retryable => Class::Unavailable,
         ErrorClass::Internal => Class::Internal,
     };
-    BackendError::new(class, error.to_string()).because(error)
+    BackendError::new(class, for_strangers(&error)).because(error)
 }
 
 fn desk_failed(error: DeskError) -> BackendError {
     if let Some(told) = upstream(&error) {
         return told.because(error);
     }
-    let text = error.to_string();
+    let text = for_strangers(&error);
     let class = match &error {
         DeskError::Full { retry_after, .. } => {
             return BackendError::new(Class::Busy, text).after(*retry_after);
@@ -403,6 +413,7 @@ mod tests {
             } else {
                 Cause::Content
             },
+            folder: None,
         };
         let stored = |source: Box<dyn Error + Send + Sync>| storage::StorageError::Object {
             key: "fields/fco2".to_owned(),
@@ -431,6 +442,34 @@ mod tests {
             reason: "a bit".to_owned(),
         };
         assert_eq!(compute_failed(own.into()).class, Class::Internal);
+    }
+
+    #[test]
+    fn a_folder_of_this_machine_is_told_to_the_log_alone() {
+        for cause in [Cause::Content, Cause::Away] {
+            let failure = Failure {
+                place: "step 2000-01, /srv/theirs.zarr array \"fco2\"".to_owned(),
+                reason: "there is no such folder".to_owned(),
+                cause,
+                folder: Some("/srv/theirs.zarr".to_owned()),
+            };
+            let stored = storage::StorageError::Object {
+                key: "fields/fco2".to_owned(),
+                source: object_store::Error::Generic {
+                    store: "attached",
+                    source: failure.into(),
+                },
+            };
+            let told = compute_failed(stored.into());
+            assert!(!told.text.contains("/srv"), "{}", told.text);
+            assert!(
+                told.text.contains("a folder of the server array"),
+                "{}",
+                told.text
+            );
+            let logged = told.source.unwrap().to_string();
+            assert!(logged.contains("/srv/theirs.zarr"), "{logged}");
+        }
     }
 
     #[tokio::test(flavor = "multi_thread")]

@@ -206,6 +206,59 @@ fn what_was_computed_is_made_again_of_what_it_is_made_of_and_carbon_of_its_flux(
 }
 
 #[test]
+fn a_dry_run_names_what_would_be_made_again_and_changes_nothing() {
+    let data = data();
+    let data = data.path();
+    let derive = "derive statistic --product fgco2 --statistic max";
+    program::succeed(data, &derive.split(' ').collect::<Vec<_>>()).unwrap();
+    let domain = files(&data.join("objects/domain/fgco2")).remove(0);
+    let field = files(&data.join("objects/frames/fgco2-max")).remove(0);
+    let of_cube = files(&data.join("objects/cubes/fgco2-max/manifests")).remove(0);
+    for path in [&domain, &field, &of_cube] {
+        flip(path);
+    }
+    let objects = data.join("objects");
+    let key = |path: &Path| {
+        path.strip_prefix(&objects)
+            .unwrap()
+            .to_str()
+            .unwrap()
+            .to_owned()
+    };
+    let content = || -> Vec<Vec<u8>> {
+        let all = files(&objects);
+        all.iter()
+            .map(|path| std::fs::read(path).unwrap())
+            .collect()
+    };
+    let before = content();
+    for (product, expected) in [
+        ("fgco2", vec![key(&domain)]),
+        (
+            "fgco2-max",
+            vec![key(&field), "the cube of fgco2-max is damaged".to_owned()],
+        ),
+    ] {
+        let words = format!("recompute --product {product} --what frames --verify");
+        let mend: Vec<&str> = words.split(' ').collect();
+        let dry = [&mend[..], &["--dry-run"]].concat();
+        let told = program::succeed(data, &dry).unwrap();
+        for one in &expected {
+            assert!(told.contains(one), "{one}: {told}");
+        }
+        let json = program::json(data, &[&dry[..], &["--json"]].concat()).unwrap();
+        let objects = json["damaged"][0]["objects"].as_array().unwrap();
+        assert_eq!(objects, &[expected[0].as_str()], "{json}");
+    }
+    assert!(content() == before, "a dry run changes nothing");
+    let words = "recompute --product fgco2-max --what frames --verify";
+    let mend: Vec<&str> = words.split(' ').collect();
+    program::succeed(data, &mend).unwrap();
+    let told = program::succeed(data, &[&mend[..], &["--dry-run"]].concat()).unwrap();
+    assert!(!told.contains("would be"), "{told}");
+}
+
+#[test]
 fn a_damaged_journal_ends_a_command_with_its_entry_and_stays_as_it_is() {
     let data = data();
     let journal = data.path().join("events/journal.jsonl");

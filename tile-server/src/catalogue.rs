@@ -87,7 +87,16 @@ impl Catalogue {
         let unknown = || ServerError::UnknownProduct {
             name: product.chars().take(80).collect(),
         };
-        let id: ProductId = product.parse().map_err(|_no_such_name| unknown())?;
+        let id: ProductId =
+            product
+                .parse()
+                .map_err(|_no_such_name| match product.parse::<AskedVersion>() {
+                    Ok(asked) => ServerError::VersionInName {
+                        product: asked.product.to_string(),
+                        version: asked.to_string(),
+                    },
+                    Err(_) => unknown(),
+                })?;
         let snapshot = self.snapshot().await?;
         match snapshot.layers.get(&id) {
             Some(layer) => Ok(Arc::clone(layer)),

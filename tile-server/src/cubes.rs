@@ -98,10 +98,9 @@ impl Cubes {
             Some(attachment) => ServerError::Attached {
                 name,
                 // A folder is of no use to who asks, and none of their business.
-                place: if attachment.store.contains("://") {
-                    format!("read it there, at {}", attachment.store)
-                } else {
-                    "it is not given out here".to_owned()
+                place: match attachment.folder() {
+                    None => format!("read it there, at {}", attachment.store),
+                    Some(_) => "it is not given out here".to_owned(),
                 },
             },
             None => ServerError::UnknownVersion { manifest: name },

@@ -66,6 +66,12 @@ pub enum ServerError {
     /// No such product.
     #[error("there is no product {name:?}; /api/products lists those there are")]
     UnknownProduct { name: String },
+    /// A version stands where a product's name belongs.
+    #[error(
+        "{version:?} is a version and no product: name the product alone, {product}, and the version by the parameter manifest={version} \
+         (with_manifest or minus_manifest for that of a second product); /api/openapi.json describes them"
+    )]
+    VersionInName { product: String, version: String },
     /// The product has no steps yet.
     #[error("product {name} has no steps yet")]
     EmptyProduct { name: String },
@@ -209,6 +215,7 @@ impl ServerError {
             | Self::Missing { .. }
             | Self::NoVector { .. } => StatusCode::BAD_REQUEST,
             Self::UnknownProduct { .. }
+            | Self::VersionInName { .. }
             | Self::EmptyProduct { .. }
             | Self::UnknownVersion { .. }
             | Self::Attached { .. }

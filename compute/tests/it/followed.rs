@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use compute::computed::{Request, RequestedInput, compute};
-use compute::dependents::{follow, follow_telling, mend, why_it_stays};
+use compute::dependents::{follow, follow_telling, mend, to_mend, why_it_stays};
 use compute::derive::{DeriveProgress, derive_statistic, derive_statistics};
 use compute::{Engine, derive_accumulated};
 use contract::analysis::{BasePeriod, MapStatistic};
@@ -325,6 +325,8 @@ async fn what_is_damaged_or_gone_of_what_was_computed_is_made_again_under_its_na
             let mut flipped = whole.to_vec();
             flipped[whole.len() / 2] ^= 2;
             store.put_over(key, flipped.into()).await.unwrap();
+            let found = to_mend(&store, &made.product).await.unwrap();
+            assert!(found.iter().eq([key]), "{found:?}");
             let mended = mend(&engine, &made.product).await.unwrap();
             assert_eq!(mended.as_ref(), Some(made), "{key}");
             assert_eq!(store.get(key).await.unwrap(), whole);
@@ -363,6 +365,8 @@ async fn what_is_damaged_or_gone_of_what_was_computed_is_made_again_under_its_na
     store.put_over(field, flipped.into()).await.unwrap();
     let refused = mend(&engine, &old.product).await.unwrap_err().to_string();
     assert!(refused.contains("how it was made is not kept"), "{refused}");
+    let found = to_mend(&store, &old.product).await.unwrap_err();
+    assert_eq!(found.to_string(), refused);
     assert!(store.exists(field).await.unwrap());
 }
 

@@ -5,9 +5,10 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
+use chrono::TimeDelta;
 use contract::key::ObjectKey;
 use contract::time::TimeMs;
-use cube::{At, Repository, clean_up, follow, verify};
+use cube::{At, CubeError, Repository, clean_up, follow, verify};
 use futures::FutureExt as _;
 use storage::gc::Keep;
 use storage::verify::Fault;
@@ -15,7 +16,7 @@ use storage::{Store, manifests};
 
 use crate::follow::{holds, version};
 use crate::product::{grid, stores};
-use crate::watched::{broken, watched};
+use crate::watched::{ahead, broken, watched};
 
 /// A product of three versions, the last without the first's step, and its cube.
 async fn three_versions(store: &Store) -> Vec<contract::manifest::Manifest> {
@@ -221,8 +222,10 @@ async fn each_part_that_is_gone_or_damaged_is_told_and_the_cube_made_again() {
         let is_found = !damaged.is_empty() || !checked.findings.is_empty();
         let is_needed = matches!(part.as_str(), "chunks" | "manifests" | "repo");
         assert!(is_found || !is_needed, "{key} gone: {checked:?}");
+        let mending = verify::mending(&store, &product).await.unwrap();
+        let is_to_be_made = mending == verify::Mending::MadeAgain;
         let is_made = verify::mend(&store, &product).await.unwrap();
-        assert_eq!(is_made, is_found, "{key}");
+        assert_eq!((is_to_be_made, is_made), (is_found, is_found), "{key}");
         let newest = [(1, 10), (2, 2), (3, 3)];
         holds(&store, At::Newest, &versions[2], &newest).await;
         if is_made {
@@ -249,7 +252,11 @@ async fn a_cube_that_is_behind_is_told_and_brought_up() {
     };
     assert_eq!(finding.fault, Fault::Behind);
     assert!(finding.reason.contains("p@4-"), "{}", finding.reason);
+    let mending = verify::mending(&store, &product).await;
+    assert_eq!(mending.unwrap(), verify::Mending::BroughtUp);
     assert!(!verify::mend(&store, &product).await.unwrap());
+    let mending = verify::mending(&store, &product).await;
+    assert_eq!(mending.unwrap(), verify::Mending::Nothing);
     holds(&store, At::Newest, &next, &[(1, 10)]).await;
 }
 
@@ -321,8 +328,39 @@ async fn a_cube_that_is_made_again_is_found_damaged_until_all_of_it_is_gone() {
     let (store, removed) = watched(&inner, |_key| async { Ok(()) }.boxed());
     assert!(verify::mend(&store, &"p".parse().unwrap()).await.unwrap());
     let removed = removed.lock().unwrap();
-    assert_eq!(removed.len(), all.len() - 1);
+    // Before all what the store's clock was read off.
+    assert_eq!(removed.len(), all.len());
+    assert_eq!(removed[0], "cubes/p/clock");
     assert_eq!(removed.last().unwrap(), "cubes/p/repo");
+}
+
+#[tokio::test]
+async fn where_the_clock_lets_nothing_be_committed_no_cube_is_removed() {
+    let inner = Store::memory();
+    three_versions(&inner).await;
+    let next = version(&inner, grid(40, 60), 4, &[(1, 10)]).await;
+    manifests::commit(&inner, &next).await.unwrap();
+    let product = "p".parse().unwrap();
+    let chunk = inner.list("cubes/p/chunks").await.unwrap().remove(0);
+    for is_damaged in [false, true] {
+        if is_damaged {
+            inner.remove(&chunk).await.unwrap();
+        }
+        let all = keys(&inner).await;
+        for minutes in [-20, 20] {
+            let (store, removed) = ahead(&inner, TimeDelta::minutes(minutes));
+            let refused = verify::mend(&store, &product).await.unwrap_err();
+            assert!(matches!(refused, CubeError::Clock { .. }), "{refused:?}");
+            // What could not be committed stays beside it.
+            assert!(keys(&inner).await.is_superset(&all), "{minutes}");
+            let removed = removed.lock().unwrap();
+            let expected: &[&str] = if is_damaged { &["cubes/p/clock"] } else { &[] };
+            assert_eq!(*removed, expected, "{minutes}");
+        }
+    }
+    let (store, _removed) = ahead(&inner, TimeDelta::minutes(5));
+    assert!(verify::mend(&store, &product).await.unwrap());
+    holds(&inner, At::Newest, &next, &[(1, 10)]).await;
 }
 
 #[tokio::test]

@@ -1,4 +1,4 @@
-//! A store in front of which something happens when objects are read, and that knows in which order they were removed.
+//! A store in front of which something happens when objects are read, that knows in which order they were removed, and whose clock may be wrong.
 
 use std::fmt::{Debug, Display, Formatter};
 use std::ops::Range;
@@ -6,6 +6,8 @@ use std::sync::{Arc, Mutex};
 
 use async_trait::async_trait;
 use bytes::Bytes;
+use chrono::TimeDelta;
+use futures::FutureExt as _;
 use futures::future::BoxFuture;
 use futures::stream::{BoxStream, StreamExt as _, TryStreamExt as _};
 use object_store::path::Path;
@@ -23,6 +25,8 @@ pub(crate) struct Watched {
     inner: Arc<dyn ObjectStore>,
     before: Before,
     removed: Arc<Mutex<Vec<String>>>,
+    /// How far the store's clock is ahead.
+    ahead: TimeDelta,
 }
 
 /// The same store, where this happens before each object is read, and the keys of objects that are removed from it.
@@ -30,13 +34,26 @@ pub(crate) fn watched(
     store: &Store,
     before: impl Fn(&str) -> BoxFuture<'static, Result<()>> + Send + Sync + 'static,
 ) -> (Store, Arc<Mutex<Vec<String>>>) {
-    let before: Before = Arc::new(before);
+    layered(store, Arc::new(before), TimeDelta::zero())
+}
+
+/// The same store with a clock that is ahead of this machine's, or behind it.
+pub(crate) fn ahead(store: &Store, ahead: TimeDelta) -> (Store, Arc<Mutex<Vec<String>>>) {
+    layered(
+        store,
+        Arc::new(|_key: &str| async { Ok(()) }.boxed()),
+        ahead,
+    )
+}
+
+fn layered(store: &Store, before: Before, ahead: TimeDelta) -> (Store, Arc<Mutex<Vec<String>>>) {
     let removed = Arc::<Mutex<Vec<String>>>::default();
     let layer = |inner| -> Arc<dyn ObjectStore> {
         Arc::new(Watched {
             inner,
             before: Arc::clone(&before),
             removed: Arc::clone(&removed),
+            ahead,
         })
     };
     (store.through(layer), removed)
@@ -78,7 +95,9 @@ impl ObjectStore for Watched {
 
     async fn get_opts(&self, at: &Path, o: GetOptions) -> Result<GetResult> {
         (self.before)(at.as_ref()).await?;
-        self.inner.get_opts(at, o).await
+        let mut found = self.inner.get_opts(at, o).await?;
+        found.meta.last_modified += self.ahead;
+        Ok(found)
     }
 
     async fn get_ranges(&self, at: &Path, ranges: &[Range<u64>]) -> Result<Vec<Bytes>> {

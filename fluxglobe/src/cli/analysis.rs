@@ -125,7 +125,8 @@ pub(crate) struct StatsCorrelate {
     /// said. 0 if absent.
     #[arg(long, value_name = "PERCENT")]
     pub(crate) min_coverage: Option<MinCoverage>,
-    /// First instant: 2000, 2000-03, 2000-03-15 or with a time of day. The products' own if absent.
+    /// First instant: 2000, 2000-03, 2000-03-15 or with a time of day. The products' own if absent. Every step that reaches into the
+    /// period counts, and whole: of months --from 2004-08-02 has all of August.
     #[arg(long)]
     pub(crate) from: Option<TimeMs>,
     /// First instant after the period. The products' own if absent.
@@ -146,7 +147,7 @@ pub(crate) struct StatsDifference {
     /// Product, and which of its versions: NAME, NAME@12 or NAME@12-0a1b2c3d. The newest if none is given.
     #[arg(long, value_name = "PRODUCT[@VERSION]")]
     pub(crate) product: AskedVersion,
-    /// Its years, both part of it: 2001/2005. All that it covers if absent.
+    /// Its years, both part of it: 2001/2005. All that it covers if absent. A step that lies partly in them counts by its time inside.
     #[arg(long, value_name = "FIRST/LAST")]
     pub(crate) period: Option<BasePeriod>,
     /// Its version, as answers name it, with or without its digest, where --product names none. The newest if absent.
@@ -155,7 +156,7 @@ pub(crate) struct StatsDifference {
     /// Product that is taken off, and which of its versions. The same product, in its newest version, if absent.
     #[arg(long, value_name = "PRODUCT[@VERSION]")]
     pub(crate) minus: Option<AskedVersion>,
-    /// Years that are taken off. The same ones if absent.
+    /// Years that are taken off. The same ones if absent. Steps count as with --period.
     #[arg(long, value_name = "FIRST/LAST")]
     pub(crate) minus_period: Option<BasePeriod>,
     /// Version that is taken off, as --manifest has it, where --minus names none. The newest if absent.

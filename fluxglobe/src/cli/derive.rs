@@ -9,6 +9,8 @@ use contract::product::ProductId;
 use contract::quantity::Quantity;
 use contract::time::TimeMs;
 
+use super::follow::Follow;
+
 /// `fluxglobe derive`.
 #[derive(Debug, Args)]
 #[command(
@@ -40,7 +42,11 @@ An input whose months hold in all of their days is marked :containing, one of on
   --input salt=takahashi09-salinity:climatology --input land=onedeg-land:any-time
 
 The result is a product: executors compute and store its steps, its manifest says what it was computed from, and asking
-again computes what has changed since.";
+again computes what has changed since. What is made of the result (statistics of it, its carbon added up) stays of the
+version before, and is named; with --follow it is made anew too, each after what it is made of:
+
+  fluxglobe derive --name wind-squared --quantity \"wind_squared:m2 s-2\" \\
+    --input wind=wind-2010 --expr \"wind * wind\" --follow";
 
 /// What is derived.
 #[derive(Debug, Subcommand)]
@@ -53,9 +59,11 @@ pub(crate) enum DeriveWhat {
         /// Product, a carbon flux.
         #[arg(long)]
         product: ProductId,
-        /// Where accumulation starts; the product's first instant if absent.
+        /// Where accumulation starts; the product's first instant if absent. A step that it lies in counts by its time after it.
         #[arg(long)]
         start: Option<TimeMs>,
+        #[command(flatten)]
+        follow: Follow,
         #[command(flatten, next_help_heading = "Kafka")]
         kafka: kafka_log::KafkaSettings,
     },
@@ -103,6 +111,8 @@ pub(crate) struct About {
     /// First instant after the period; a step that it lies in is computed whole.
     #[arg(long)]
     pub(crate) to: Option<TimeMs>,
+    #[command(flatten)]
+    pub(crate) follow: Follow,
     #[command(flatten, next_help_heading = "Kafka")]
     pub(crate) kafka: kafka_log::KafkaSettings,
 }

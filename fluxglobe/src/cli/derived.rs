@@ -9,6 +9,7 @@ use contract::product::ProductId;
 use contract::region::AskedRegion;
 use contract::time::{TimeMs, TimeStep};
 
+use super::follow::Follow;
 use super::steps::STEPS;
 
 /// What the long help ends with.
@@ -30,9 +31,9 @@ What a statistic was made from and how it was asked for is in its manifest (`com
 something lands in that, in either of two, or in what that was made from, the deriver of a cluster
 (in the scheduler's process) makes it anew, with all else that was made from it; asked again, the
 same is done at once. What a command derives anew takes nothing along that was made from it: the
-command names what is of an older version then, to be derived again or with the next landing. Steps
-that come are read too where --to leaves that open; a region stays what it was. One that is made
-with --once stays as it is until it is asked for again.";
+command names what is of an older version then, and with --follow makes that anew too, each after
+what it was made from. Steps that come are read too where --to leaves that open; a region stays
+what it was. One that is made with --once stays as it is until it is asked for again.";
 
 /// `fluxglobe derive statistic`.
 #[derive(Debug, Args)]
@@ -101,6 +102,8 @@ pub(crate) struct DeriveStatistic {
     /// Made of the versions that are there now, and by itself of none after them.
     #[arg(long)]
     pub(crate) once: bool,
+    #[command(flatten)]
+    pub(crate) follow: Follow,
     #[command(flatten, next_help_heading = "Kafka")]
     pub(crate) kafka: kafka_log::KafkaSettings,
 }

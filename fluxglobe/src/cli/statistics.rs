@@ -75,7 +75,8 @@ pub(crate) struct StatsPoint {
     /// Latitude, degrees north.
     #[arg(long, allow_negative_numbers = true, value_parser = degrees)]
     pub(crate) lat: f64,
-    /// First instant of statistics: 2000, 2000-03, 2000-03-15 or with a time of day. The product's first if absent.
+    /// First instant: 2000, 2000-03, 2000-03-15 or with a time of day. The product's first if absent. A step that lies partly in the
+    /// period counts by its time inside, and its row ends with the period; whole in what is made of the series (--climatology and its like).
     #[arg(long)]
     pub(crate) from: Option<TimeMs>,
     /// First instant after the period. The product's end if absent.
@@ -102,7 +103,8 @@ pub(crate) struct StatsLine {
     /// `LON,LAT;LON,LAT;...`, a GeoJSON or WKT file with lines, or the text of one. Between two vertices it is a great circle.
     #[arg(long, allow_hyphen_values = true)]
     pub(crate) line: String,
-    /// First instant: 2000, 2000-03, 2000-03-15 or with a time of day. The product's first if absent.
+    /// First instant: 2000, 2000-03, 2000-03-15 or with a time of day. The product's first if absent. A step that lies partly in the
+    /// period counts by its time inside, and its row ends with the period; whole in what is made of the series (--climatology and its like).
     #[arg(long)]
     pub(crate) from: Option<TimeMs>,
     /// First instant after the period. The product's end if absent.
@@ -130,7 +132,9 @@ pub(crate) struct StatsPolygon {
     /// or MASK:CODE, the cells where a landed mask has a code, or what it means: basins:5, basins:southern.
     #[arg(long, allow_hyphen_values = true)]
     pub(crate) region: String,
-    /// First instant: 2000, 2000-03, 2000-03-15 or with a time of day. The product's first if absent.
+    /// First instant: 2000, 2000-03, 2000-03-15 or with a time of day. The product's first if absent. A step that lies partly in the
+    /// period has a whole row, and counts whole in what is made of the series (--climatology and its like); with --statistic, --step, --cells,
+    /// --min-coverage or --csv it counts by its time inside, and its row ends with the period.
     #[arg(long)]
     pub(crate) from: Option<TimeMs>,
     /// First instant after the period. The product's end if absent.

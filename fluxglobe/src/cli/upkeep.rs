@@ -89,7 +89,7 @@ pub(crate) struct Recompute {
     /// computed from, sums and tiles from those.
     #[arg(long)]
     pub(crate) verify: bool,
-    /// Show the plan and do nothing.
+    /// Show the plan and do nothing; with --verify also name each object that is damaged or gone and would be made again, and each cube.
     #[arg(long)]
     pub(crate) dry_run: bool,
     /// The plan as JSON.

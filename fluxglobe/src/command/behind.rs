@@ -17,13 +17,32 @@ pub(super) async fn say_what_is_behind<'a>(
 ) -> Result<()> {
     // A file each may have landed in one product.
     let products: BTreeSet<&ProductId> = products.into_iter().collect();
+    let products: Vec<&ProductId> = products.into_iter().collect();
+    say(store, &products, |behind| told(behind, &products)).await
+}
+
+/// The same of products that a command derived, which can bring along what is made of them.
+pub(super) async fn say_what_would_follow(store: &Store, derived: &[&ProductId]) -> Result<()> {
+    say(store, derived, would_follow).await
+}
+
+/// Says what is still of older versions of products though it was to be brought along.
+pub(super) async fn say_what_is_left(store: &Store, derived: &[&ProductId]) -> Result<()> {
+    say(store, derived, left).await
+}
+
+/// Says a line about what is behind products; none where nothing is.
+async fn say(
+    store: &Store,
+    products: &[&ProductId],
+    line: impl FnOnce(&[ProductId]) -> String,
+) -> Result<()> {
     if products.is_empty() {
         return Ok(());
     }
-    let products: Vec<&ProductId> = products.into_iter().collect();
-    let behind = compute::dependents::behind(store, &products).await?;
-    if let Some(line) = told(&behind, &products) {
-        progress::say(&line);
+    let behind = compute::dependents::behind(store, products).await?;
+    if !behind.is_empty() {
+        progress::say(&line(&behind));
     }
     Ok(())
 }
@@ -56,11 +75,12 @@ fn not_added_up(product: &ProductId) -> String {
     )
 }
 
-/// The line; none where nothing is behind.
-fn told(behind: &[ProductId], products: &[&ProductId]) -> Option<String> {
-    if behind.is_empty() {
-        return None;
-    }
+fn names(behind: &[ProductId]) -> String {
+    let names: Vec<&str> = behind.iter().map(ProductId::as_str).collect();
+    names.join(", ")
+}
+
+fn told(behind: &[ProductId], products: &[&ProductId]) -> String {
     let accumulated = |of: &ProductId| of.accumulated().is_ok_and(|it| behind.contains(&it));
     // `derive accumulated` would begin at the first step, wherever its start was chosen.
     let all = behind.iter().chain(products.iter().copied());
@@ -68,12 +88,28 @@ fn told(behind: &[ProductId], products: &[&ProductId]) -> Option<String> {
         format!("; `fluxglobe recompute --product {of}` makes what of its carbon is stale")
     });
     let recomputed: Vec<String> = recomputed.collect();
-    let names: Vec<&str> = behind.iter().map(ProductId::as_str).collect();
-    Some(format!(
-        "made of an older version: {}; derive them again, or the deriver of a cluster does when something lands in what they are made from{}",
-        names.join(", "),
+    format!(
+        "made of an older version: {}; derive them again (with `--follow` what is made of each comes along), or the deriver of a cluster does \
+         when something lands in what they are made from{}",
+        names(behind),
         recomputed.concat()
-    ))
+    )
+}
+
+fn would_follow(behind: &[ProductId]) -> String {
+    format!(
+        "made of an older version: {}; the same command with `--follow` brings them along, or the deriver of a cluster does when something lands \
+         in what they are made from",
+        names(behind)
+    )
+}
+
+fn left(behind: &[ProductId]) -> String {
+    format!(
+        "not brought along, and still made of an older version: {}; what cannot be made again is told above with the reason, and \
+         `fluxglobe products` says what stays as it is: derive these otherwise",
+        names(behind)
+    )
 }
 
 #[cfg(test)]
@@ -93,15 +129,31 @@ mod tests {
     fn what_is_behind_is_named_and_carbon_keeps_its_start() {
         let id = |name: &str| -> ProductId { name.parse().unwrap() };
         let flux = id("flux");
-        assert_eq!(told(&[], &[&flux]), None);
-        let line = told(&[id("flux-mean")], &[&flux]).unwrap();
+        let line = told(&[id("flux-mean")], &[&flux]);
         assert!(line.starts_with("made of an older version: flux-mean; derive them again"));
+        assert!(line.contains("`--follow`"), "{line}");
         assert!(!line.contains("recompute"), "{line}");
-        let line = told(&[id("flux-accumulated"), id("flux-mean")], &[&flux]).unwrap();
+        let line = told(&[id("flux-accumulated"), id("flux-mean")], &[&flux]);
         assert!(line.contains("flux-accumulated, flux-mean;"), "{line}");
         assert!(
             line.contains("; `fluxglobe recompute --product flux` makes"),
             "{line}"
         );
+    }
+
+    #[test]
+    fn what_a_derivation_leaves_behind_is_named_with_what_brings_it_along() {
+        let behind: [ProductId; 2] =
+            ["twice-accumulated", "twice-mean"].map(|name| name.parse().unwrap());
+        let line = would_follow(&behind);
+        assert!(
+            line.contains(
+                "version: twice-accumulated, twice-mean; the same command with `--follow`"
+            ),
+            "{line}"
+        );
+        let line = left(&behind[1..]);
+        assert!(line.starts_with("not brought along"), "{line}");
+        assert!(line.contains("twice-mean; what cannot"), "{line}");
     }
 }

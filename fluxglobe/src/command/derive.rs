@@ -7,7 +7,6 @@ use compute::DeriveProgress;
 use compute::computed::co2_flux::Source;
 use compute::computed::{Request, RequestedInput};
 use contract::computed::{Computation, Matching};
-use contract::event::Event;
 use contract::manifest::Manifest;
 use contract::product::ProductId;
 use contract::quantity::Quantity;
@@ -16,8 +15,8 @@ use kafka_log::KafkaSettings;
 use storage::Store;
 use storage::log::EventLog;
 
-use super::behind::say_what_is_behind;
 use super::budget::stored_region;
+use super::follow::{onwards, tell};
 use crate::cli::{
     Derive, DeriveCo2Flux, DeriveStatistic, DeriveWhat, Expression, Regrid, Settings,
 };
@@ -33,6 +32,7 @@ pub(crate) async fn run(settings: &Settings, options: Derive) -> Result<()> {
         Some(DeriveWhat::Accumulated {
             product,
             start,
+            follow,
             kafka,
         }) => {
             let store = deployment::store(settings)?;
@@ -41,7 +41,7 @@ pub(crate) async fn run(settings: &Settings, options: Derive) -> Result<()> {
             let log = log.as_deref();
             let manifest = accumulated(settings, store.clone(), log, &product, start).await?;
             progress::result(&manifest.id().to_string())?;
-            say_what_is_behind(&store, [&manifest.product]).await
+            onwards(settings, (&store, log), &[&manifest.product], follow.follow).await
         }
     }
 }
@@ -74,7 +74,8 @@ async fn expression(settings: &Settings, options: Expression) -> Result<()> {
         from: options.about.from,
         to: options.about.to,
     };
-    computed(settings, &options.about.kafka, &request).await
+    let (kafka, follow) = (&options.about.kafka, options.about.follow.follow);
+    computed(settings, kafka, &request, follow).await
 }
 
 async fn co2_flux(settings: &Settings, options: DeriveCo2Flux) -> Result<()> {
@@ -96,7 +97,8 @@ async fn co2_flux(settings: &Settings, options: DeriveCo2Flux) -> Result<()> {
         from: options.about.from,
         to: options.about.to,
     };
-    computed(settings, &options.about.kafka, &request).await
+    let (kafka, follow) = (&options.about.kafka, options.about.follow.follow);
+    computed(settings, kafka, &request, follow).await
 }
 
 async fn regrid(settings: &Settings, options: Regrid) -> Result<()> {
@@ -125,11 +127,17 @@ async fn regrid(settings: &Settings, options: Regrid) -> Result<()> {
         from: options.about.from,
         to: options.about.to,
     };
-    computed(settings, &options.about.kafka, &request).await
+    let (kafka, follow) = (&options.about.kafka, options.about.follow.follow);
+    computed(settings, kafka, &request, follow).await
 }
 
 /// Computes a product with a progress bar, tells of it, and says how far it is to be trusted.
-async fn computed(settings: &Settings, kafka: &KafkaSettings, request: &Request) -> Result<()> {
+async fn computed(
+    settings: &Settings,
+    kafka: &KafkaSettings,
+    request: &Request,
+    is_followed: bool,
+) -> Result<()> {
     let store = deployment::store(settings)?;
     let log = listening(settings, kafka).await?;
     let bar = progress::bar("compute on Ballista", 0);
@@ -170,7 +178,8 @@ async fn computed(settings: &Settings, kafka: &KafkaSettings, request: &Request)
         ));
     }
     progress::result(&manifest.id().to_string())?;
-    say_what_is_behind(engine.store(), [&manifest.product]).await
+    let told = (engine.store(), log.as_deref());
+    onwards(settings, told, &[&manifest.product], is_followed).await
 }
 
 /// What is said of steps of which no cell holds data; none if there is no such one.
@@ -233,16 +242,9 @@ async fn statistic(settings: &Settings, options: &DeriveStatistic) -> Result<()>
         }
         progress::result(&manifest.id().to_string())?;
     }
-    say_what_is_behind(engine.store(), made.iter().map(|made| &made.product)).await
-}
-
-/// Tells of a derived version, once.
-async fn tell(log: Option<&dyn EventLog>, manifest: &Manifest) -> Result<()> {
-    if let (Some(log), Some(body)) = (log, compute::derive::derived(manifest)) {
-        let event = Event::new(manifest.id().to_string(), body);
-        storage::log::tell_once(log, &event).await?;
-    }
-    Ok(())
+    let products: Vec<&ProductId> = made.iter().map(|made| &made.product).collect();
+    let told = (engine.store(), log.as_deref());
+    onwards(settings, told, &products, options.follow.follow).await
 }
 
 /// Computes accumulated carbon with a progress bar; at once if it is there already.

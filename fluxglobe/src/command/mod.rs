@@ -9,6 +9,7 @@ pub(crate) mod derive;
 mod export;
 mod fill_error;
 mod flight_sql;
+mod follow;
 mod gc;
 pub(crate) mod generate;
 mod geometry;

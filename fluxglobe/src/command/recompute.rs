@@ -2,6 +2,7 @@
 //!
 //! In the order in which one follows from the other: files read anew, what is computed from their fields, tiles.
 
+mod damaged;
 mod files;
 mod tiles;
 
@@ -17,6 +18,7 @@ use serde::Serialize;
 use storage::Store;
 use storage::log::EventLog;
 
+use self::damaged::Damaged;
 use super::behind::say_what_is_behind;
 use crate::cli::{Recompute, RecomputeWhat, Settings};
 use crate::{deployment, progress};
@@ -29,6 +31,8 @@ struct Shown<'a> {
     files: Option<&'a ingest::reread::Plan>,
     tiles_missing: usize,
     tiles_there: usize,
+    /// With `--verify` and `--dry-run`.
+    damaged: &'a [Damaged],
 }
 
 pub(crate) async fn run(settings: &Settings, options: Recompute) -> Result<()> {
@@ -48,16 +52,24 @@ pub(crate) async fn run(settings: &Settings, options: Recompute) -> Result<()> {
         tiles::Tiles::default()
     };
     let files_plan = files.as_ref().map(|files| &files.plan);
-    show(&plan, files_plan, &wanted, options.json)?;
+    let is_verified = with_fields && options.verify;
     if options.dry_run {
+        let damaged = if is_verified {
+            Damaged::all(&store, &options).await?
+        } else {
+            vec![]
+        };
+        show(&plan, files_plan, &wanted, &damaged, options.json)?;
         progress::say("nothing was done: --dry-run");
-        return say_what_is_behind(&store, [&options.product]).await;
+        say_what_is_behind(&store, [&options.product]).await?;
+        return check_before(&store, &options.product, is_verified).await;
     }
+    show(&plan, files_plan, &wanted, &[], options.json)?;
     let log = deployment::log(settings, &options.kafka).await?;
     if let Some(files) = &files {
         files.read(&store, log.as_deref()).await?;
     }
-    if with_fields && options.verify {
+    if is_verified {
         computed(settings, &store, (&options.product, log.as_deref())).await?;
     }
     // Planned anew: what was read just now makes stale what follows from it.
@@ -80,7 +92,7 @@ pub(crate) async fn run(settings: &Settings, options: Recompute) -> Result<()> {
     // Accumulated carbon follows with the fields, and nothing else that is made of either.
     let accumulated = options.product.accumulated().ok().filter(|_| with_fields);
     say_what_is_behind(&store, accumulated.iter().chain([&options.product])).await?;
-    if with_fields && options.verify {
+    if is_verified {
         cubes(&store, &options.product).await?;
     }
     if with_tiles {
@@ -90,15 +102,15 @@ pub(crate) async fn run(settings: &Settings, options: Recompute) -> Result<()> {
         let told = log.as_deref().filter(|_| kafka);
         tiles::draw(settings, store.clone(), told, &wanted).await?;
     }
-    if with_fields && options.verify {
-        check_before(&store, &options.product).await?;
-    }
-    Ok(())
+    check_before(&store, &options.product, is_verified).await
 }
 
 /// # Errors
 /// Something of a version before the newest one, which is not made again, is damaged or gone.
-async fn check_before(store: &Store, product: &ProductId) -> Result<()> {
+async fn check_before(store: &Store, product: &ProductId, is_verified: bool) -> Result<()> {
+    if !is_verified {
+        return Ok(());
+    }
     let mut broken = BTreeSet::new();
     for product in [Some(product.clone()), product.accumulated().ok()] {
         let Some(product) = product else { continue };
@@ -176,6 +188,7 @@ fn show(
     plan: &Plan,
     files: Option<&ingest::reread::Plan>,
     tiles: &tiles::Tiles,
+    damaged: &[Damaged],
     json: bool,
 ) -> Result<()> {
     if json {
@@ -184,6 +197,7 @@ fn show(
             files,
             tiles_missing: tiles.missing.len(),
             tiles_there: tiles.there,
+            damaged,
         };
         return progress::result(&serde_json::to_string_pretty(&shown)?);
     }
@@ -219,6 +233,9 @@ fn show(
         "0".to_owned(),
     ]);
     progress::result(&table.trim_fmt())?;
+    for line in damaged.iter().flat_map(Damaged::lines) {
+        progress::result(&line)?;
+    }
     progress::say(&format!(
         "for {}; {} are right as they are",
         plan.manifest,

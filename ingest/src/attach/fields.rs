@@ -92,6 +92,7 @@ impl Source for ForeignFields {
             place: place(),
             reason,
             cause: Cause::Content,
+            folder: attachment.folder().map(str::to_owned),
         };
         let reading = Reading::of(attachment).map_err(refused)?;
         let foreign = match self.foreign(attachment).await {
@@ -167,6 +168,7 @@ fn of_step(error: ForeignError, attachment: &Attachment, period: Period) -> Fail
         place: format!("step {period}, {}{array}", error.place),
         reason: error.reason,
         cause: error.cause,
+        folder: attachment.folder().map(str::to_owned),
     }
 }
 

@@ -79,6 +79,11 @@ impl Attachment {
         format!("{} array {}", self.store, self.array)
     }
 
+    /// The folder of this machine that the store is; none of one behind an address.
+    pub fn folder(&self) -> Option<&str> {
+        (!self.store.contains("://")).then_some(&self.store)
+    }
+
     /// Reads it from the bytes under its key.
     pub(super) fn of_bytes(key: &ObjectKey, content: &[u8]) -> Result<Self, StorageError> {
         let own: Self =

@@ -128,6 +128,7 @@ impl Layer {
                 place,
                 reason,
                 cause: Cause::Content,
+                folder: None,
             })
         })?;
         if reference.is_none() {
@@ -169,6 +170,7 @@ impl Layer {
                 place.product
             ),
             cause: Cause::Content,
+            folder: attachment.folder().map(str::to_owned),
         };
         Err(failed(gone.unwrap_or_else(changed)))
     }
@@ -184,6 +186,7 @@ impl Layer {
                     place: key.to_string(),
                     reason,
                     cause: Cause::Content,
+                    folder: None,
                 })
             };
             if found.meta.size > MAX_ATTACHMENT_BYTES {

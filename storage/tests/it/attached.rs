@@ -55,6 +55,7 @@ impl Source for Gone {
             place: format!("step {}, {}", reference.period, attachment.place()),
             reason: "its store is no longer there".to_owned(),
             cause: Cause::Content,
+            folder: None,
         })
     }
 }

@@ -176,3 +176,27 @@ async fn a_globe_and_a_tilejson_show_the_version_that_was_asked_for() {
         app.get(&same).await.header("etag")
     );
 }
+
+#[tokio::test]
+async fn a_version_in_the_place_of_a_name_is_told_where_it_belongs() {
+    let app = TestApp::new().await;
+    let cited = version(&app, "flux").await;
+    for named in ["flux@1", &cited] {
+        for address in [
+            format!("/api/products/{named}/point?lon=0&lat=0"),
+            format!("/tiles/{named}/volume/0/0/0.png"),
+            format!("/tiles/{named}/volume.json"),
+        ] {
+            let answer = app.get(&address).await;
+            assert_eq!(answer.status, StatusCode::NOT_FOUND, "{address}");
+            let refusal = answer.json();
+            let told = refusal["error"].as_str().unwrap();
+            assert!(told.contains(&format!("manifest={named}")), "{told}");
+        }
+        let right = format!("/api/products/flux/point?lon=0&lat=0&manifest={named}");
+        assert_eq!(app.get(&right).await.status, StatusCode::OK, "{right}");
+    }
+    let answer = app.get("/api/products/flux@x/point?lon=0&lat=0").await;
+    let refusal = answer.json();
+    assert!(!refusal["error"].as_str().unwrap().contains("manifest="));
+}
