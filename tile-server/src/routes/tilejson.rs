@@ -10,6 +10,7 @@ use contract::manifest::ManifestId;
 use contract::picture::PictureRequest;
 use contract::tile::{MAX_LAT_DEG, MAX_ZOOM};
 use contract::time::TimeMs;
+use legend::svg::escaped;
 use serde::{Deserialize, Serialize};
 use utoipa::{IntoParams, ToSchema};
 
@@ -107,13 +108,21 @@ impl TileJsonQuery {
 
     /// The drawing of the colours as HTML, which is one of the two things clients take a legend for.
     fn legend(&self, origin: &str, layer: &Layer, mode: Mode) -> Result<String, ServerError> {
-        let mut parameters = self.look.parse()?.parameters();
+        // Versions of quantities that are not built in may have colours over other ranges.
+        let named = self.manifest.as_ref();
+        let version = named.map(|_named| format!("manifest={}", layer.id));
+        let look = self.look.parse()?.parameters();
+        let mut parameters: Vec<String> = version.into_iter().chain(look).collect();
         if mode == Mode::Flow {
             parameters.push(format!("mode={mode}"));
         }
-        let query = query_of(&parameters).replace('&', "&amp;");
-        let (product, title) = (&layer.manifest.product, layer.manifest.quantity.title());
-        let address = format!("{origin}/api/products/{product}/legend.svg{query}");
+        let query = query_of(&parameters);
+        let product = &layer.manifest.product;
+        let address = escaped(&format!(
+            "{origin}/api/products/{product}/legend.svg{query}"
+        ));
+        // Files state it in any letters.
+        let title = escaped(layer.manifest.quantity.title());
         Ok(format!("<img src=\"{address}\" alt=\"{title}\">"))
     }
 }

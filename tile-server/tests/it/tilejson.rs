@@ -90,6 +90,37 @@ async fn synthetic_data_say_so() {
 }
 
 #[tokio::test]
+async fn the_legend_is_that_of_the_version_asked_for_and_a_title_is_no_markup() {
+    let app = TestApp::new().await;
+    let plain = Quantity::open("river_flux", "1", "\"River\" <flux>").unwrap();
+    let cited = app
+        .land("rivers", plain.over([0.0, 5.0]).unwrap(), 1)
+        .await
+        .to_string();
+    app.land("rivers", plain.over([0.0, 90.0]).unwrap(), 2)
+        .await;
+    let title = "&quot;River&quot; &lt;flux&gt;";
+    let named = app
+        .get("/tiles/rivers/map.json?palette=ice&manifest=rivers@1")
+        .await
+        .json();
+    let address = format!("/api/products/rivers/legend.svg?manifest={cited}");
+    assert_eq!(
+        named["legend"],
+        format!("<img src=\"{address}&amp;palette=ice\" alt=\"{title}\">")
+    );
+    let legend = app.get(&address.replace("svg", "json")).await.json();
+    assert_eq!(legend["high"], json!(5.0));
+    let newest = app.get("/tiles/rivers/map.json").await.json();
+    assert_eq!(
+        newest["legend"],
+        format!("<img src=\"/api/products/rivers/legend.svg\" alt=\"{title}\">")
+    );
+    let legend = app.get("/api/products/rivers/legend.json").await.json();
+    assert_eq!(legend["high"], json!(90.0));
+}
+
+#[tokio::test]
 async fn a_layer_without_its_ending_is_nothing() {
     let app = TestApp::new().await;
     assert_eq!(
