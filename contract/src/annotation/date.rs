@@ -7,7 +7,7 @@ use crate::analysis::MapStatistic;
 use crate::computed::{Computation, Computed};
 use crate::manifest::Manifest;
 use crate::quantity::Quantity;
-use crate::time::TimeMs;
+use crate::time::{Period, TimeMs};
 
 /// The date of a picture.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -45,7 +45,12 @@ impl DateLabel {
             }
             steps => {
                 let day = if period.has_days() {
-                    time.day_in_words()
+                    let told = if accumulated {
+                        time
+                    } else {
+                        within(product, time)
+                    };
+                    told.day_in_words()
                 } else {
                     time.in_words()
                 };
@@ -70,6 +75,16 @@ impl DateLabel {
             note: note.and_then(|note| Label::cut(&note)),
         })
     }
+}
+
+/// An instant of the last day of a product in the place of its end, with which a day begins that no step holds: it is what is shown of all
+/// that was asked for beyond.
+fn within(product: &Manifest, time: TimeMs) -> TimeMs {
+    let is_end = product
+        .extent()
+        .is_some_and(|Period { end, .. }| end == time);
+    let before = TimeMs::new(time.ms() - 1).ok();
+    before.filter(|_| is_end).unwrap_or(time)
 }
 
 /// May values of a step be means over it? Codes have none, and heights and shares of land hold at any time.

@@ -7,7 +7,7 @@ use crate::grid::Grid;
 use crate::job::Mode;
 use crate::key::ObjectKey;
 use crate::manifest::{MANIFEST_SCHEMA, Step};
-use crate::picture::{PictureOptions, PictureRequest};
+use crate::picture::{PictureOptions, PictureRequest, shown_time};
 use crate::product::ProductId;
 use crate::quantity::{Flag, OpenQuantity, OpenWords, Quantity};
 use crate::time::{Period, TimeStep};
@@ -98,6 +98,24 @@ fn what_is_asked_for_is_there_and_nothing_else() {
         options: PictureOptions::default(),
     };
     assert_eq!(plain.job(&sources).unwrap().annotations, None);
+}
+
+#[test]
+fn beyond_the_last_step_the_date_is_its_last_day_and_of_sums_the_instant() {
+    let shown = |quantity, asked: &str| {
+        let product = product("flux", quantity, months());
+        let time = shown_time(&product, asked.parse().ok()).unwrap();
+        let date = DateLabel::of(&product, time).unwrap();
+        date.shown.as_str().to_owned()
+    };
+    for asked in ["2001-01-01", "2003-05-05"] {
+        assert_eq!(shown(Quantity::CarbonFlux, asked), "31 December 2000");
+        assert_eq!(shown(Quantity::AccumulatedCarbon, asked), "1 January 2001");
+    }
+    for quantity in [Quantity::CarbonFlux, Quantity::AccumulatedCarbon] {
+        assert_eq!(shown(quantity, "2000-12-01"), "1 December 2000");
+        assert_eq!(shown(quantity, "1999-05-05"), "1 January 2000");
+    }
 }
 
 #[test]
