@@ -14,6 +14,7 @@ use contract::time::{Period, TimeMs};
 use contract::trails::{TrailSources, eastward_part, no_vector};
 use serde::{Deserialize, Serialize};
 use storage::Store;
+use tile_server::equal_until;
 
 use crate::cli::{Camera, GroundOptions, Picture, RenderGlobe, Settings};
 use crate::{deployment, progress};
@@ -96,11 +97,11 @@ pub(crate) async fn job(
         ));
     }
     let northward = northward(store, &product, picture.mode).await?;
-    let accumulated = accumulated(store, &product).await?;
+    let lift = lift(store, &product, picture.mode, shown).await?;
     let vector = vector(store, picture).await?;
     let sources = PictureSources {
         product: &product,
-        accumulated: accumulated.as_ref(),
+        accumulated: lift.as_ref().and_then(|lift| lift.at(shown)),
         northward: northward.as_ref(),
         trails: vector.as_ref().map(Vector::trails),
         relief: relief(store, settings, picture).await?,
@@ -220,6 +221,65 @@ pub(crate) async fn northward(
         format!("{name} is not drawn as a flow before {product} has landed; ingest the same files with its profile")
     })?;
     Ok(Some(latest))
+}
+
+/// Accumulated carbon that lifts the particles of a version.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Lift {
+    pub(crate) manifest: Manifest,
+    /// The last instant at which it holds for that version: none if it was derived from exactly that one.
+    pub(crate) until: Option<TimeMs>,
+}
+
+impl Lift {
+    /// It, where it holds.
+    fn at(&self, time: TimeMs) -> Option<&Manifest> {
+        let holds = self.until.is_none_or(|until| time <= until);
+        holds.then_some(&self.manifest)
+    }
+}
+
+/// What lifts the particles of a version in a mode, as a server has it: the newest accumulated carbon, that of a version before as far as
+/// nothing changed that it was summed from. It is said where none of it holds at `last`, the latest instant that is shown.
+pub(crate) async fn lift(
+    store: &Store,
+    manifest: &Manifest,
+    mode: Mode,
+    last: TimeMs,
+) -> Result<Option<Lift>> {
+    let (Ok(product), false) = (
+        manifest.product.accumulated(),
+        matches!(mode, Mode::Map | Mode::Flow),
+    ) else {
+        return Ok(None);
+    };
+    let Some(derived) = storage::manifests::latest(store, &product).await? else {
+        return Ok(None);
+    };
+    let Some(source) = derived.derived_from.clone() else {
+        return Ok(None);
+    };
+    let own = manifest.id();
+    if source == own {
+        return Ok(Some(Lift {
+            manifest: derived,
+            until: None,
+        }));
+    }
+    // One that was cleaned up cannot be compared.
+    let before = storage::manifests::load(store, &source).await.ok();
+    let until = before.and_then(|before| equal_until(&before, manifest));
+    if until.is_none_or(|until| until < last) {
+        let since = until.map_or_else(String::new, |until| format!(" after {until}"));
+        let name = &manifest.product;
+        progress::say(&format!(
+            "{product} was added up from {source}, and nothing lifts the particles of {own}{since}: `fluxglobe derive accumulated --product {name}` brings it up to date"
+        ));
+    }
+    Ok(until.map(|until| Lift {
+        manifest: derived,
+        until: Some(until),
+    }))
 }
 
 /// Accumulated carbon of just this version of a product, if it was derived.

@@ -23,7 +23,7 @@ use crate::metrics::Metrics;
 use crate::versions::Versions;
 use snapshot::{FOLDER, Reader, Snapshot};
 
-pub use layer::{Accumulated, Layer, Northward};
+pub use layer::{Accumulated, Layer, Northward, equal_until};
 
 /// How long a store is waited for by those who can be served from what was known before.
 const RETRY_LIMIT: Duration = Duration::from_secs(2);

@@ -63,7 +63,7 @@ mod stream;
 mod surroundings;
 mod versions;
 
-pub use catalogue::{Accumulated, Layer, Northward};
+pub use catalogue::{Accumulated, Layer, Northward, equal_until};
 pub use config::Settings;
 pub use error::{ServeError, ServerError};
 pub use request::job as picture_job;

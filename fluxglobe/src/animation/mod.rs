@@ -16,6 +16,7 @@ use bytes::Bytes;
 use contract::encoding::Encoding;
 use contract::job::View;
 use contract::manifest::Manifest;
+use contract::picture::shown_time;
 use contract::sun::SunChoice;
 use contract::time::TimeMs;
 use futures::stream::{self, StreamExt as _, TryStreamExt as _};
@@ -114,8 +115,11 @@ async fn shots(settings: &Settings, store: &Store, options: &RenderAnimation) ->
         asked.sun = None;
     }
     let style = asked.style_in(&view, product.quantity, globe.picture.mode, from)?;
+    let last = shown_time(&product, Some(to))?;
+    let lift = picture::lift(store, &product, globe.picture.mode, last).await?;
     let shots = Shots {
-        accumulated: picture::accumulated(store, &product).await?,
+        accumulated_until: lift.as_ref().and_then(|lift| lift.until),
+        accumulated: lift.map(|lift| lift.manifest),
         northward: picture::northward(store, &product, globe.picture.mode).await?,
         product,
         from,

@@ -26,6 +26,9 @@ pub(super) struct Shots {
     pub(super) product: Manifest,
     /// Its accumulated carbon.
     pub(super) accumulated: Option<Manifest>,
+    /// The last instant at which that holds; none where it was derived from this version.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) accumulated_until: Option<TimeMs>,
     /// The northward part of its vector, in the mode flow.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) northward: Option<Manifest>,
@@ -127,16 +130,17 @@ impl Shots {
         if self.sun_of_time {
             style.sun = SunChoice::OfTime.instead_of(style.sun, time);
         }
+        // As the picture alone has it: the nearest instant that the product covers.
+        let shown = shown_time(&self.product, Some(time))?;
+        let holds = self.accumulated_until.is_none_or(|until| shown <= until);
         let sources = PictureSources {
             product: &self.product,
-            accumulated: self.accumulated.as_ref(),
+            accumulated: self.accumulated.as_ref().filter(|_| holds),
             northward: self.northward.as_ref(),
             trails: self.vector.as_ref().map(Vector::trails),
             relief: self.relief.clone(),
         };
         let job = sources.job(self.mode, view, time, style)?;
-        // As the picture alone has it: the nearest instant that the product covers.
-        let shown = shown_time(&self.product, Some(time))?;
         Ok(sources.annotated(job, shown, self.annotations)?)
     }
 }

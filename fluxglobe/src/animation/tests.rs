@@ -11,13 +11,15 @@ use contract::key::ObjectKey;
 use contract::manifest::{MANIFEST_SCHEMA, Manifest, Step};
 use contract::product::ProductId;
 use contract::quantity::Quantity;
-use contract::time::Period;
+use contract::time::{Period, TimeMs};
 use render::Image;
+use storage::{Store, manifests};
 
 use super::encoder::{self, Container, Encoder};
 use super::folder::Folder;
 use super::shots::Shots;
 use super::strip::Strip;
+use crate::picture;
 
 /// The twelve months of 2000 on a grid of one cell.
 fn product() -> Manifest {
@@ -68,6 +70,7 @@ fn shots(count: u32) -> Shots {
     Shots {
         product: product(),
         accumulated: None,
+        accumulated_until: None,
         northward: None,
         vector: None,
         from: "2000-01-01".parse().unwrap(),
@@ -167,6 +170,43 @@ fn the_pictures_of_a_flow_drift_from_one_to_the_next() {
     shots.northward = None;
     let refused = shots.job(0).unwrap_err().to_string();
     assert!(refused.contains("northward"), "{refused}");
+}
+
+#[tokio::test]
+async fn what_was_added_up_from_a_version_before_lifts_what_is_equal_in_both() {
+    let store = Store::memory();
+    let now = Manifest {
+        number: 2,
+        ..product()
+    };
+    let before = Manifest {
+        steps: now.steps[..6].to_vec(),
+        ..product()
+    };
+    let derived = Manifest {
+        product: before.product.accumulated().unwrap(),
+        quantity: Quantity::AccumulatedCarbon,
+        derived_from: Some(before.id()),
+        ..before.clone()
+    };
+    for manifest in [&before, &now, &derived] {
+        manifests::commit(&store, manifest).await.unwrap();
+    }
+    let until: TimeMs = "2000-07-01".parse().unwrap();
+    let lift = async |of: &Manifest, mode| picture::lift(&store, of, mode, until).await.unwrap();
+    assert_eq!(lift(&before, Mode::Volume).await.unwrap().until, None);
+    assert_eq!(lift(&now, Mode::Map).await, None);
+    let found = lift(&now, Mode::Volume).await.unwrap();
+    assert_eq!(found.until, Some(until));
+    // A picture a day.
+    let shots = Shots {
+        product: now.clone(),
+        accumulated: Some(found.manifest),
+        accumulated_until: found.until,
+        ..shots(366)
+    };
+    let is_lifted = |number| shots.job(number).unwrap().accumulated.is_some();
+    assert!(is_lifted(0) && is_lifted(182) && !is_lifted(183));
 }
 
 #[test]

@@ -86,7 +86,7 @@ impl Layer {
 
 /// The end of the steps at the start of both versions that are equal in both; none if what was summed up from one says
 /// nothing of the other.
-pub(super) fn equal_until(before: &Manifest, now: &Manifest) -> Option<TimeMs> {
+pub fn equal_until(before: &Manifest, now: &Manifest) -> Option<TimeMs> {
     if before.product != now.product || before.grid != now.grid || before.domain != now.domain {
         return None;
     }
