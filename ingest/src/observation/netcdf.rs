@@ -266,6 +266,13 @@ fn is_of_surface(property: &str) -> bool {
 }
 
 fn instant(measured: &Measured<'_>, number: f64) -> Result<TimeMs, Rejection> {
+    let refused = |why: String| Rejection::new(RejectReason::Time, &measured.time.name, why);
+    if !measured.time_unit.is_instant(number) {
+        let why = format!(
+            "says {number} in months or years, which are not equally long: nothing says which instant that is; give it in days"
+        );
+        return Err(refused(why));
+    }
     let date = measured.time_unit.date(number).and_then(period::instant);
-    date.map_err(|e| Rejection::new(RejectReason::Time, &measured.time.name, e))
+    date.map_err(refused)
 }
