@@ -63,7 +63,12 @@ pub(super) async fn read(
                 gathered.begin(&variable.name);
                 take(session, &measured, &mut shared, &mut gathered).await?;
             }
-            Err(rejection) => passed_over.push(rejection),
+            Err(rejection) => {
+                if measured::is_of_samples(&rejection) {
+                    gathered.pass_over(rejection.clone());
+                }
+                passed_over.push(rejection);
+            }
         }
     }
     let none = || {

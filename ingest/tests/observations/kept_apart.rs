@@ -3,7 +3,7 @@
 use contract::event::RejectReason;
 use contract::observation::{Observation, Quality};
 
-use crate::made::{Draft, SST, observations, read, refusal, seen, settings};
+use crate::made::{Draft, SST, observations, passed_over, read, refusal, seen, settings};
 
 /// One buoy with three hours of temperatures.
 fn buoy(attributes: &[(&str, &str)]) -> Draft {
@@ -212,4 +212,25 @@ async fn parts_of_months_and_years_are_no_instants() {
         assert_eq!(refused.reason, RejectReason::Time);
         assert!(refused.detail.contains("not equally long"), "{refused}");
     }
+}
+
+#[tokio::test]
+async fn a_variable_that_was_measured_and_is_not_read_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let draft = buoy(&[]).variable(
+        "wind",
+        &["time"],
+        &[("standard_name", "wind_speed"), ("units", "furlong")],
+        vec![1.0, 2.0, 3.0],
+    );
+    // What has no name, or no place and time, is of something else.
+    let draft = draft
+        .variable("number", &["time"], &[], vec![1.0, 2.0, 3.0])
+        .variable("deployed", &["place"], &[("units", "m")], vec![7.0]);
+    let told = passed_over(&draft.write(folder.path())).await;
+    assert_eq!(told.len(), 1, "{told:?}");
+    assert!(
+        told[0].starts_with("wind: has unit \"furlong\""),
+        "{told:?}"
+    );
 }
