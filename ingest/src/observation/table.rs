@@ -116,7 +116,7 @@ pub(super) fn read(content: &[u8], source: Source<'_>) -> Result<Found, Rejectio
 }
 
 /// # Errors
-/// Nothing is measured in these columns, or depths are no lengths.
+/// Nothing is measured in these columns, times are of the place, or depths are no lengths.
 fn check(columns: &Columns) -> Result<(), Rejection> {
     if let Some(rejection) = columns.passed_over.first()
         && columns.measured.is_empty()
@@ -126,6 +126,10 @@ fn check(columns: &Columns) -> Result<(), Rejection> {
     if columns.measured.is_empty() {
         let detail = "has no measured column that is known, such as SST, sal or fCO2rec";
         return Err(Rejection::new(RejectReason::NoVariable, "columns", detail));
+    }
+    if columns.lacks_utc() {
+        let detail = "is of the place, and nothing says how far that is from UTC; give it in UTC, or with its offset";
+        return Err(Rejection::new(RejectReason::Time, "time", detail));
     }
     if let Some((_, None)) = columns.depth {
         let detail = "has a unit that is no length; give depths in m";
@@ -414,6 +418,21 @@ mod tests {
             .replace("181.", "30.");
         let found = read(west.as_bytes(), SOURCE).unwrap().observations;
         assert!((found[0].lon_deg + 30.5).abs() < 1e-9, "{:?}", found[0]);
+    }
+
+    #[test]
+    fn times_of_the_place_are_refused() {
+        for (own, other) in [("\thh\t", "\thour (local)\t"), ("\thh\t", "\tHH [LST]\t")] {
+            let table = TABLE.replace(own, other);
+            let refused = read(table.as_bytes(), SOURCE).unwrap_err();
+            assert_eq!(refused.reason, RejectReason::Time, "{refused}");
+        }
+        let utc = TABLE.replace("\thh\t", "\thour (UTC)\t");
+        read(utc.as_bytes(), SOURCE).unwrap();
+        let both = TABLE.replace("WOA_SSS", "Date/Time (local)");
+        let found = read(both.as_bytes(), SOURCE).unwrap().observations;
+        let time = found[0].time.to_string();
+        assert_eq!(time, "2015-07-14T07:14:40Z", "that of the other columns");
     }
 
     #[test]

@@ -22,6 +22,8 @@ pub(super) struct Columns {
     pub(super) date_time: Option<usize>,
     /// Year, month, day, hour, minute, second.
     pub(super) clock: [Option<usize>; 6],
+    /// Is there one more that says it is of the place, and not UTC?
+    is_local: bool,
     pub(super) measured: Vec<Measured>,
     /// Columns of what is measured that are not read, and why.
     pub(super) passed_over: Vec<Rejection>,
@@ -142,8 +144,14 @@ impl Columns {
         let has_day = columns.clock[..3].iter().all(Option::is_some);
         let is_table = columns.latitude.is_some()
             && columns.longitude.is_some()
-            && (columns.date_time.is_some() || has_day);
+            && (columns.date_time.is_some() || has_day || columns.is_local);
         is_table.then_some(columns)
+    }
+
+    /// Are times, or parts of them, of the place alone?
+    pub(super) fn lacks_utc(&self) -> bool {
+        let has_hour = self.clock[..4].iter().all(Option::is_some);
+        self.is_local && self.date_time.is_none() && !has_hour
     }
 
     fn note(&mut self, at: usize, name: &str, unit: Option<&str>) {
@@ -160,6 +168,14 @@ impl Columns {
         }
         if DEPTH.contains(&name) {
             self.depth.get_or_insert_with(|| (at, metres(unit)));
+            return;
+        }
+        let is_time = [DATE_TIME]
+            .iter()
+            .chain(&CLOCK)
+            .any(|names| names.contains(&name));
+        if is_time && unit.is_some_and(is_local) {
+            self.is_local = true;
             return;
         }
         let places = [
@@ -238,6 +254,13 @@ fn sign(unit: Option<&str>, against: [&str; 2]) -> f64 {
         is_usual |= ["e", "east", "n", "north"].contains(&word);
     }
     if is_against && !is_usual { -1.0 } else { 1.0 }
+}
+
+/// Does what stands behind the name of a time, such as `(local)`, say that it is of the place?
+fn is_local(words: &str) -> bool {
+    let lower = words.to_ascii_lowercase();
+    let mut words = lower.split(|c: char| !c.is_ascii_alphabetic());
+    words.any(|word| matches!(word, "local" | "lst" | "lt"))
 }
 
 /// Metres of a unit of depths; none if it is no length.
