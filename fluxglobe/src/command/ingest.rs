@@ -90,7 +90,8 @@ struct Line {
     /// Values that the file gave and that are none here, by why; absent of what did not land.
     #[serde(skip_serializing_if = "Option::is_none")]
     masked: Option<MaskedCells>,
-    /// What was taken for granted of a file that lands, and which of its steps are left out; absent if nothing.
+    /// What was taken for granted of a file that lands, and which of its steps are left out; what of a file of observations is not read;
+    /// absent if nothing.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     assumptions: Vec<String>,
 }
@@ -123,6 +124,7 @@ impl Line {
             masked: outcome.masked(),
             assumptions: match outcome {
                 Outcome::Landed { assumptions, .. } => assumptions.clone(),
+                Outcome::Observed { passed_over, .. } => passed_over.clone(),
                 _ => vec![],
             },
         }

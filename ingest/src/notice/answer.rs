@@ -83,13 +83,14 @@ impl PendingNotice {
         &self,
         dataset: ProductId,
         stored: Stored,
-        masked: MaskedCells,
+        (masked, passed_over): (MaskedCells, Vec<String>),
     ) -> Answer {
         let outcome = Outcome::Observed {
             file: self.path(),
             dataset,
             stored,
             masked,
+            passed_over,
         };
         self.answer(outcome, None)
     }

@@ -60,6 +60,8 @@ pub enum Outcome {
         stored: Stored,
         /// Values that it gave and that are no observations.
         masked: MaskedCells,
+        /// What was measured and is not read, and why.
+        passed_over: Vec<String>,
     },
     /// It was refused.
     Rejected {
@@ -169,6 +171,7 @@ impl Display for Outcome {
                 file,
                 stored,
                 masked,
+                passed_over,
                 ..
             } => {
                 let gap = if masked.is_none() { "" } else { "; " };
@@ -179,7 +182,9 @@ impl Display for Outcome {
                     stored.new,
                     stored.replaced,
                     stored.same
-                )
+                )?;
+                let told = |text: &String| write!(f, "; not read: {text}");
+                passed_over.iter().try_for_each(told)
             }
             Self::Rejected {
                 file,

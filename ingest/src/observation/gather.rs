@@ -28,6 +28,8 @@ pub(crate) struct Found {
     pub(crate) observations: Vec<Observation>,
     /// Values that the file gave and that are no observations.
     pub(crate) masked: MaskedCells,
+    /// What was measured and is not read, and why.
+    pub(crate) passed_over: Vec<Rejection>,
 }
 
 /// The observations of one file.
@@ -44,6 +46,8 @@ pub(super) struct Gathered {
     superseded: u64,
     /// Values of properties that several variables say different things of.
     contradicted: u64,
+    /// What was measured and is not read.
+    passed_over: Vec<Rejection>,
     /// By property.
     tallies: BTreeMap<String, Tally>,
 }
@@ -92,6 +96,24 @@ impl Gathered {
         tally.mask(|| format!("{value:e} {}{}", conversion.unit, conversion.bounds()));
     }
 
+    /// Counts a value of digits that are no number.
+    pub(super) fn unread(&mut self, conversion: &Conversion, text: &str) {
+        /// Letters of it that are told.
+        const MOST: usize = 32;
+        let tally = self.tally(&conversion.property);
+        tally.mask(|| {
+            let told: String = text.chars().take(MOST).collect();
+            format!("{told:?}, which is no number")
+        });
+    }
+
+    /// Notes what was measured and is not read.
+    pub(super) fn pass_over(&mut self, rejection: Rejection) {
+        if !self.passed_over.contains(&rejection) {
+            self.passed_over.push(rejection);
+        }
+    }
+
     /// Counts a value outside the valid range that the file states.
     pub(super) fn out_of_range(&mut self) {
         self.out_of_range += 1;
@@ -126,9 +148,6 @@ impl Gathered {
         {
             return Err(first.clone());
         }
-        for rejection in &contradictions {
-            tracing::info!(%rejection, "a property is passed over");
-        }
         let mut implausible = self.unplaced + self.contradicted;
         for (property, tally) in &self.tallies {
             let all = tally.taken + tally.implausible;
@@ -155,9 +174,11 @@ impl Gathered {
         if self.found.is_empty() {
             return Err(why);
         }
+        let passed_over = self.passed_over.into_iter().chain(contradictions);
         Ok(Found {
             observations: self.found,
             masked,
+            passed_over: passed_over.collect(),
         })
     }
 }
@@ -436,6 +457,8 @@ mod tests {
         let is_air = |o: &Observation| o.property == "air_temperature";
         assert!(found.observations.iter().all(is_air));
         assert_eq!((found.observations.len(), found.masked.implausible), (2, 4));
+        let told: Vec<&str> = found.passed_over.iter().map(|one| &*one.object).collect();
+        assert_eq!(told, ["one and other"]);
     }
 
     #[test]

@@ -18,8 +18,9 @@ use crate::plan::cf::calendar::{Calendar, TimeUnit};
 use crate::plan::method;
 use crate::plan::unit;
 
-/// Depth down to which ships take in and buoys meet what they call surface water; their sensors and hulls reach to 3 to 10 m.
-const SURFACE_M: f64 = 20.0;
+/// What numbers lack that are none of samples.
+const NO_NAME: &str = "has neither a standard name nor a unit";
+const NO_PLACE: &str = "has no latitude, longitude and time for each of its values";
 
 /// A measured variable with all that its samples need.
 pub(super) struct Measured<'a> {
@@ -81,6 +82,11 @@ pub(super) fn is_candidate(file: &Description, variable: &Variable) -> bool {
     variable.is_numeric() && !variable.dimensions.is_empty() && !is_remark && !is_bounds && !is_axis
 }
 
+/// Is it of a variable that was measured? Numbers without a name, or without a place and a time, are of something else.
+pub(super) fn is_of_samples(rejection: &Rejection) -> bool {
+    ![NO_NAME, NO_PLACE].contains(&rejection.detail.as_str())
+}
+
 fn is_about_quality(long_name: &str) -> bool {
     let lower = long_name.to_ascii_lowercase();
     lower.ends_with("quality") || lower.ends_with("quality flag") || lower.ends_with(" flag")
@@ -137,10 +143,7 @@ pub(super) async fn prepare<'a>(
 ) -> Result<Result<Measured<'a>, Rejection>, Stop> {
     let refuse = |reason, detail: String| Ok(Err(Rejection::new(reason, &variable.name, detail)));
     let Some(property) = property_of(variable) else {
-        return refuse(
-            RejectReason::Unit,
-            "has neither a standard name nor a unit".to_owned(),
-        );
+        return refuse(RejectReason::Unit, NO_NAME.to_owned());
     };
     let spelling = variable.attributes.text("units").unwrap_or_default();
     let conversion = match Conversion::new(&property, spelling) {
@@ -153,7 +156,7 @@ pub(super) async fn prepare<'a>(
         place(session, file, variable, sampling, Says::Longitude).await?,
     ];
     let [Some(time), Some(latitude), Some(longitude)] = found else {
-        let detail = "has no latitude, longitude and time for each of its values".to_owned();
+        let detail = NO_PLACE.to_owned();
         return refuse(RejectReason::NoVariable, detail);
     };
     let time_unit = match time_unit(file, &time.name) {
@@ -272,7 +275,7 @@ fn is_by_level(variable: &Variable, depth: &Coordinate, others: &[&Coordinate]) 
 /// Is one of the depths of a coordinate beyond what ships and buoys measure "the surface" at: that of a glider or a diver?
 fn reaches_down(depth: &Coordinate, to: ToDepth) -> bool {
     // Only casts have their depth by pressure, for which alone the latitude matters.
-    (depth.values.iter()).any(|number| to.depth_m(*number, 0.0) > SURFACE_M)
+    (depth.values.iter()).any(|number| to.depth_m(*number, 0.0) > property::SURFACE_M)
 }
 
 fn time_unit(file: &Description, name: &str) -> Result<TimeUnit, String> {

@@ -154,6 +154,22 @@ impl Layout {
         }
         TimeMs::new(midnight.ms() + i64::from(hour * 60 + minute) * 60_000).ok()
     }
+
+    /// What a measured column of a line says.
+    fn given(words: &[&str], (at, column, conversion): &(usize, &Column, Conversion)) -> Given {
+        let number = words.get(*at).and_then(|word| word.parse::<f64>().ok());
+        let number = number.filter(|n| is_measured(*n, column));
+        number.map_or(Given::Missing, |n| conversion.given(n))
+    }
+
+    /// Counts the values of a line without a date.
+    fn pass_over(&self, words: &[&str], gathered: &mut Gathered) {
+        for measured in &self.measured {
+            if Self::given(words, measured) != Given::Missing {
+                gathered.unplaced();
+            }
+        }
+    }
 }
 
 /// Reads a file.
@@ -174,6 +190,7 @@ pub(super) fn read(content: &[u8], source: Source<'_>) -> Result<Found, Rejectio
         let text = std::str::from_utf8(line).unwrap_or_default().trim();
         if line.len() > MAX_LINE_BYTES {
             bad += 1;
+            gathered.unplaced();
             continue;
         }
         // The second line of newer files holds units.
@@ -183,13 +200,13 @@ pub(super) fn read(content: &[u8], source: Source<'_>) -> Result<Found, Rejectio
         let words: Vec<&str> = text.split_whitespace().collect();
         let Some(time) = layout.time(&words) else {
             bad += 1;
+            layout.pass_over(&words, &mut gathered);
             continue;
         };
         good += 1;
-        for (at, column, conversion) in &layout.measured {
-            let number = words.get(*at).and_then(|word| word.parse::<f64>().ok());
-            let number = number.filter(|n| is_measured(*n, column));
-            let value = match number.map_or(Given::Missing, |n| conversion.given(n)) {
+        for measured in &layout.measured {
+            let (_, column, conversion) = measured;
+            let value = match Layout::given(&words, measured) {
                 Given::Value(value) => value,
                 Given::Missing => continue,
                 Given::Implausible(value) => {
@@ -244,10 +261,8 @@ mod tests {
 
     #[test]
     fn a_line_becomes_values_in_stored_units_without_its_nines() {
-        let Found {
-            observations: found,
-            masked,
-        } = read(OLD.as_bytes(), SOURCE).unwrap();
+        let found = read(OLD.as_bytes(), SOURCE).unwrap();
+        let (found, masked) = (found.observations, found.masked);
         assert!(masked.is_none(), "nines are no values: {masked}");
         let of = |property: &str| {
             found
@@ -332,5 +347,25 @@ mod tests {
             read(header.as_bytes(), SOURCE).unwrap_err().reason,
             RejectReason::Values
         );
+    }
+
+    #[test]
+    fn values_of_lines_without_a_date_are_counted() {
+        let line = |date: &str| {
+            format!(
+                "{date} 50  99  5.5  6.3  0.89  5.56  4.60 999 1007.8   6.1   8.1 999.0 99.0 99.00\n"
+            )
+        };
+        let header = OLD.lines().next().unwrap();
+        let good: String = (0..200)
+            .map(|hour| line(&format!("2012 01 {:02} {:02}", hour / 24 + 1, hour % 24)))
+            .collect();
+        let lost = line("2012 02 30 00");
+        let found = read(format!("{header}\n{good}{lost}").as_bytes(), SOURCE).unwrap();
+        // Those of its columns that hold no nines.
+        assert_eq!(found.masked.implausible, 9);
+        let long = format!("{header}\n{good}2012 01 20 {}\n", "0 ".repeat(4096));
+        let found = read(long.as_bytes(), SOURCE).unwrap();
+        assert_eq!(found.masked.implausible, 1);
     }
 }

@@ -63,7 +63,12 @@ pub(super) async fn read(
                 gathered.begin(&variable.name);
                 take(session, &measured, &mut shared, &mut gathered).await?;
             }
-            Err(rejection) => passed_over.push(rejection),
+            Err(rejection) => {
+                if measured::is_of_samples(&rejection) {
+                    gathered.pass_over(rejection.clone());
+                }
+                passed_over.push(rejection);
+            }
         }
     }
     let none = || {
@@ -266,6 +271,13 @@ fn is_of_surface(property: &str) -> bool {
 }
 
 fn instant(measured: &Measured<'_>, number: f64) -> Result<TimeMs, Rejection> {
+    let refused = |why: String| Rejection::new(RejectReason::Time, &measured.time.name, why);
+    if !measured.time_unit.is_instant(number) {
+        let why = format!(
+            "says {number} in months or years, which are not equally long: nothing says which instant that is; give it in days"
+        );
+        return Err(refused(why));
+    }
     let date = measured.time_unit.date(number).and_then(period::instant);
-    date.map_err(|e| Rejection::new(RejectReason::Time, &measured.time.name, e))
+    date.map_err(refused)
 }

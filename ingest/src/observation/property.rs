@@ -13,6 +13,8 @@ pub(super) struct Property {
     pub(super) plausible: RangeInclusive<f64>,
 }
 
+/// Depth down to which ships take in and buoys meet what they call surface water; their sensors and hulls reach to 3 to 10 m.
+pub(super) const SURFACE_M: f64 = 20.0;
 /// Longest name of a property.
 const MAX_NAME_CHARS: usize = 64;
 /// Unit of directions, which no unit parser knows as a unit of anything else.

@@ -38,7 +38,7 @@ impl Scheme {
             };
             return Self::Bits(flags.into_iter().map(said).collect());
         }
-        let values = variable.attributes.numbers("flag_values");
+        let values = values(variable);
         let meanings = variable.attributes.text("flag_meanings");
         match (values, meanings) {
             (Some(values), Some(meanings)) => {
@@ -162,6 +162,24 @@ fn is_of_woce(name: &str) -> bool {
 /// The worse of two verdicts; no value is the worst.
 pub(super) fn worse(a: Verdict, b: Verdict) -> Verdict {
     a.zip(b).map(|(a, b)| a.max(b))
+}
+
+/// What `flag_values` holds: numbers, or of flags that are letters the digits that these are, however they are written (`0, 1, 4`, `014`, or
+/// the codes of the letters). None if there are none.
+fn values(variable: &Variable) -> Option<Vec<f64>> {
+    let zero = f64::from(b'0');
+    let is_of_letters = variable.kind == Kind::Text(1);
+    if let Some(numbers) = variable.attributes.numbers("flag_values") {
+        let digit = |number: f64| {
+            let is_letter = is_of_letters && (zero..zero + 10.0).contains(&number);
+            if is_letter { number - zero } else { number }
+        };
+        return Some(numbers.into_iter().map(digit).collect());
+    }
+    let text = variable.attributes.text("flag_values")?;
+    let letters = text.chars().filter(|c| c.is_alphanumeric());
+    let digits = letters.map(|c| c.to_digit(10).map_or(f64::NAN, f64::from));
+    Some(digits.collect())
 }
 
 /// What `flag_meanings` say of each of so many flags: a word a flag, or a phrase between commas or semicolons. Nothing if there are
@@ -312,6 +330,29 @@ mod tests {
         assert_eq!(verdicts("good bad"), [Some(NotEvaluated); 3]);
     }
 
+    #[test]
+    fn flags_that_are_letters_mean_what_is_said_of_them() {
+        let meanings = || AttributeValue::Text("good bad unknown".to_owned());
+        let verdicts = |values: AttributeValue| {
+            let told = [("flag_values", values), ("flag_meanings", meanings())];
+            let scheme = Scheme::of(&Variable {
+                kind: Kind::Text(1),
+                ..variable("temp_qc", &told)
+            });
+            // By the primary scheme 4 is bad, and 0 and 1 are not.
+            [4.0, 1.0, 0.0].map(|flag| scheme.verdict(flag))
+        };
+        let told = [Some(Good), Some(Bad), Some(NotEvaluated)];
+        for text in ["410", "4, 1, 0", "4 1 0", "'4', '1', '0'"] {
+            let text = AttributeValue::Text(text.to_owned());
+            assert_eq!(verdicts(text.clone()), told, "{text:?}");
+        }
+        let kind = Kind::Integer(1);
+        let bits = [52.0_f64, 49.0, 48.0].map(Into::into).to_vec();
+        assert_eq!(verdicts(AttributeValue::Numbers { kind, bits }), told);
+        let text = AttributeValue::Text("41".to_owned());
+        assert_eq!(verdicts(text), [Some(NotEvaluated); 3]);
+    }
     #[test]
     fn errors_and_counts_are_no_flags() {
         let named = |name: &str| {

@@ -8,12 +8,13 @@ use std::collections::BTreeMap;
 use contract::event::RejectReason;
 use contract::observation::{Observation, PlatformKind, Quality};
 use contract::product::ProductId;
-use csv::{ByteRecord, ReaderBuilder};
+use csv::{ByteRecord, Reader, ReaderBuilder};
 
-use super::convert::{Conversion, Given};
+use super::convert::Given;
 use super::gather::{Found, Gathered};
+use super::property::SURFACE_M;
 use super::quality::Scheme;
-use super::table_columns::Columns;
+use super::table_columns::{Columns, Degrees, Measured};
 use super::{Source, name, table_time};
 use crate::error::Rejection;
 
@@ -79,24 +80,18 @@ pub(super) fn read(content: &[u8], source: Source<'_>) -> Result<Found, Rejectio
         )
     };
     let (columns, start) = columns(content).ok_or_else(none)?;
-    if columns.measured.is_empty() {
-        let detail = "has no measured column that is known, such as SST, sal or fCO2rec";
-        return Err(Rejection::new(RejectReason::NoVariable, "columns", detail));
-    }
+    let content = &content[start..];
+    check(&columns)?;
     let is_socat = columns.measured.iter().any(|m| m.is_flagged);
     let stem = name::stem(source.file_name);
     let mut reading = TableReader {
         dataset: name::dataset(source, if is_socat { "socat" } else { stem }),
         lone_platform: name::platform(stem).unwrap_or_else(|| "1".to_owned()),
+        is_of_depths: reaches_down(&columns, content),
         gathered: Gathered::default(),
         spans: BTreeMap::new(),
     };
-    let mut rows = ReaderBuilder::new()
-        .delimiter(b'\t')
-        .quoting(false)
-        .flexible(true)
-        .has_headers(false)
-        .from_reader(&content[start..]);
+    let mut rows = rows_of(content);
     let (mut good, mut bad) = (0u64, 0u64);
     let mut record = ByteRecord::new();
     let broken = |e: csv::Error| Rejection::new(RejectReason::Corrupt, "file", e.to_string());
@@ -114,7 +109,57 @@ pub(super) fn read(content: &[u8], source: Source<'_>) -> Result<Found, Rejectio
         let detail = format!("{bad} of {all} rows have no place or time; it is damaged");
         return Err(Rejection::new(RejectReason::Corrupt, "file", detail));
     }
+    for rejection in columns.passed_over {
+        reading.gathered.pass_over(rejection);
+    }
     reading.finish()
+}
+
+/// # Errors
+/// Nothing is measured in these columns, times are of the place, or depths are no lengths.
+fn check(columns: &Columns) -> Result<(), Rejection> {
+    if let Some(rejection) = columns.passed_over.first()
+        && columns.measured.is_empty()
+    {
+        return Err(rejection.clone());
+    }
+    if columns.measured.is_empty() {
+        let detail = "has no measured column that is known, such as SST, sal or fCO2rec";
+        return Err(Rejection::new(RejectReason::NoVariable, "columns", detail));
+    }
+    if columns.lacks_utc() {
+        let detail = "is of the place, and nothing says how far that is from UTC; give it in UTC, or with its offset";
+        return Err(Rejection::new(RejectReason::Time, "time", detail));
+    }
+    if let Some((_, None)) = columns.depth {
+        let detail = "has a unit that is no length; give depths in m";
+        return Err(Rejection::new(RejectReason::Unit, "depth", detail));
+    }
+    Ok(())
+}
+
+/// The rows below the names of columns.
+fn rows_of(content: &[u8]) -> Reader<&[u8]> {
+    ReaderBuilder::new()
+        .delimiter(b'\t')
+        .quoting(false)
+        .flexible(true)
+        .has_headers(false)
+        .from_reader(content)
+}
+
+/// Is one of the depths beyond what ships and buoys call the surface, so that nobody knows how deep a sample is whose depth is missing?
+fn reaches_down(columns: &Columns, content: &[u8]) -> bool {
+    let Some((at, Some(metres))) = columns.depth else {
+        return false;
+    };
+    let (mut rows, mut record) = (rows_of(content), ByteRecord::new());
+    while matches!(rows.read_byte_record(&mut record), Ok(true)) {
+        if remark(&record, at).is_some_and(|depth| depth * metres > SURFACE_M) {
+            return true;
+        }
+    }
+    false
 }
 
 /// What was read of a table so far.
@@ -122,6 +167,8 @@ struct TableReader {
     dataset: ProductId,
     /// Name of the platform where no column says it.
     lone_platform: String,
+    /// Are samples at depths of all kinds?
+    is_of_depths: bool,
     gathered: Gathered,
     spans: BTreeMap<String, Span>,
 }
@@ -132,7 +179,14 @@ impl TableReader {
         let platform = platform.unwrap_or_else(|| self.lone_platform.clone());
         let span = self.spans.entry(platform.clone()).or_default();
         span.widen(row.place);
-        for (conversion, value, depth_m, quality) in row.values(columns) {
+        for measured in &columns.measured {
+            if let Some(text) = unread(row.record, measured.at) {
+                self.gathered.unread(&measured.conversion, text);
+            }
+        }
+        let sample_m = row.depth_m(columns).or((!self.is_of_depths).then_some(0.0));
+        for (measured, value, quality) in row.values(columns) {
+            let conversion = &measured.conversion;
             let value = match value {
                 Given::Value(value) => value,
                 Given::Missing => continue,
@@ -140,6 +194,10 @@ impl TableReader {
                     self.gathered.implausible(conversion, value);
                     continue;
                 }
+            };
+            let Some(depth_m) = measured.height_m.or(sample_m) else {
+                self.gathered.unplaced();
+                continue;
             };
             self.gathered.take(Observation {
                 dataset: self.dataset.clone(),
@@ -163,7 +221,8 @@ impl TableReader {
         for measured in &columns.measured {
             let number = number(record, measured.at);
             let given = number.map(|number| measured.conversion.given(number));
-            if matches!(given, Some(Given::Value(_) | Given::Implausible(_))) {
+            let is_value = matches!(given, Some(Given::Value(_) | Given::Implausible(_)));
+            if is_value || unread(record, measured.at).is_some() {
                 self.gathered.unplaced();
             }
         }
@@ -210,6 +269,19 @@ fn number(record: &ByteRecord, at: usize) -> Option<f64> {
     text.trim().parse().ok()
 }
 
+/// The text of a field that holds digits and no number, such as `12,5` or `<0.1`; words stand for no value.
+fn unread(record: &ByteRecord, at: usize) -> Option<&str> {
+    let text = std::str::from_utf8(record.get(at)?).ok()?.trim();
+    let is_unread = text.bytes().any(|b| b.is_ascii_digit()) && text.parse::<f64>().is_err();
+    is_unread.then_some(text)
+}
+
+/// A depth or a flag.
+fn remark(record: &ByteRecord, at: usize) -> Option<f64> {
+    let is_one = |number: &f64| *number > MISSING_BELOW && *number < MISSING_ABOVE;
+    number(record, at).filter(is_one)
+}
+
 /// A row with a place and a time.
 struct Row<'a> {
     record: &'a ByteRecord,
@@ -220,14 +292,18 @@ struct Row<'a> {
 impl<'a> Row<'a> {
     fn of(columns: &Columns, record: &'a ByteRecord) -> Option<Self> {
         let field = |at: usize| std::str::from_utf8(record.get(at)?).ok().map(str::trim);
-        let number = |at: Option<usize>| field(at?)?.parse::<f64>().ok();
-        let (lon, lat) = (number(columns.longitude)?, number(columns.latitude)?);
-        let is_place = (-180.0..=360.0).contains(&lon) && (-90.0..=90.0).contains(&lat);
+        let number = |column: Degrees| field(column.at)?.parse::<f64>().ok();
+        let (longitude, latitude) = (columns.longitude?, columns.latitude?);
+        let (lon, lat) = (number(longitude)?, number(latitude)?);
         let time = table_time::of_row(columns, field)?;
-        is_place.then_some(Self {
+        let is_place = (-180.0..=360.0).contains(&lon) && (-90.0..=90.0).contains(&lat);
+        let is_at_depth = columns
+            .depth
+            .is_none_or(|(at, _)| unread(record, at).is_none());
+        (is_place && is_at_depth).then_some(Self {
             record,
             time,
-            place: [lon, lat],
+            place: [longitude.sign * lon, latitude.sign * lat],
         })
     }
 
@@ -235,27 +311,28 @@ impl<'a> Row<'a> {
         std::str::from_utf8(self.record.get(at?)?).ok()
     }
 
-    /// A depth or a flag.
-    fn remark(&self, at: usize) -> Option<f64> {
-        let is_one = |number: &f64| *number > MISSING_BELOW && *number < MISSING_ABOVE;
-        number(self.record, at).filter(is_one)
+    /// Depth of the sample, 0 where no column says any; none where that is missing.
+    fn depth_m(&self, columns: &Columns) -> Option<f64> {
+        match columns.depth {
+            Some((at, metres)) => Some(remark(self.record, at)? * metres?),
+            None => Some(0.0),
+        }
     }
 
-    /// What was measured, what its number is, and its depth and quality; not what its flag calls missing.
-    fn values(
+    /// What was measured, what its number is, and its quality; not what its flag calls missing.
+    fn values<'b>(
         &self,
-        columns: &'a Columns,
-    ) -> impl Iterator<Item = (&'a Conversion, Given, f64, Quality)> {
-        let depth_m = columns.depth.and_then(|at| self.remark(at)).unwrap_or(0.0);
-        let flag = columns.flag.and_then(|at| self.remark(at));
+        columns: &'b Columns,
+    ) -> impl Iterator<Item = (&'b Measured, Given, Quality)> {
+        let record = self.record;
+        let flag = columns.flag.and_then(|at| remark(record, at));
         columns.measured.iter().filter_map(move |measured| {
-            let value = measured.conversion.given(number(self.record, measured.at)?);
+            let value = measured.conversion.given(number(record, measured.at)?);
             let quality = match flag {
                 Some(flag) if measured.is_flagged => Scheme::Woce.verdict(flag)?,
                 _ => Quality::NotEvaluated,
             };
-            let height_m = measured.height_m.unwrap_or(depth_m);
-            Some((&measured.conversion, value, height_m, quality))
+            Some((measured, value, quality))
         })
     }
 }
@@ -274,10 +351,8 @@ mod tests {
 
     #[test]
     fn rows_become_observations_with_their_flags() {
-        let Found {
-            observations: found,
-            masked,
-        } = read(TABLE.as_bytes(), SOURCE).unwrap();
+        let found = read(TABLE.as_bytes(), SOURCE).unwrap();
+        let (found, masked) = (found.observations, found.masked);
         assert!(masked.is_none(), "{masked}");
         let of = |property: &str| -> Vec<_> {
             let those = found.iter().filter(|o| o.property == property);
@@ -334,5 +409,91 @@ mod tests {
         let header: String = TABLE.split_inclusive('\n').take(2).collect();
         assert_eq!(reason(&header), RejectReason::Values);
         assert_eq!(undated().reason, RejectReason::Time);
+    }
+
+    #[test]
+    fn places_in_degrees_west_are_in_the_west() {
+        let west = TABLE
+            .replace("longitude [dec.deg.E]", "longitude [deg.W]")
+            .replace("181.", "30.");
+        let found = read(west.as_bytes(), SOURCE).unwrap().observations;
+        assert!((found[0].lon_deg + 30.5).abs() < 1e-9, "{:?}", found[0]);
+    }
+
+    #[test]
+    fn times_of_the_place_are_refused() {
+        for (own, other) in [("\thh\t", "\thour (local)\t"), ("\thh\t", "\tHH [LST]\t")] {
+            let table = TABLE.replace(own, other);
+            let refused = read(table.as_bytes(), SOURCE).unwrap_err();
+            assert_eq!(refused.reason, RejectReason::Time, "{refused}");
+        }
+        let utc = TABLE.replace("\thh\t", "\thour (UTC)\t");
+        read(utc.as_bytes(), SOURCE).unwrap();
+        let both = TABLE.replace("WOA_SSS", "Date/Time (local)");
+        let found = read(both.as_bytes(), SOURCE).unwrap().observations;
+        let time = found[0].time.to_string();
+        assert_eq!(time, "2015-07-14T07:14:40Z", "that of the other columns");
+    }
+
+    #[test]
+    fn depths_have_the_unit_of_their_column() {
+        let depth = |unit: &str| {
+            let table = TABLE.replace("sample_depth [m]", unit);
+            read(table.as_bytes(), SOURCE).map(|found| found.observations[0].depth_m)
+        };
+        assert_eq!(depth("sample_depth [cm]").ok(), Some(0.05));
+        let refused = depth("sample_depth [dbar]").unwrap_err();
+        assert_eq!(refused.reason, RejectReason::Unit, "{refused}");
+    }
+
+    /// A row of TABLE with other words for the depth and the salinity.
+    fn row(depth: &str, salinity: &str, minute: usize) -> String {
+        format!(
+            "33HQ\t2015\t7\t15\t7\t{minute}\t40\t181.5\t70.9\t{depth}\t{salinity}\t1.0\t30\t271.4\t2\n"
+        )
+    }
+
+    #[test]
+    fn numbers_that_cannot_be_read_are_counted_and_words_are_none() {
+        let good: String = (0..40).map(|minute| row("5", "31.5", minute)).collect();
+        let found = read(format!("{TABLE}{good}").as_bytes(), SOURCE).unwrap();
+        assert_eq!(found.masked.implausible, 0);
+        let words = format!("{TABLE}{good}{}", row("5", "n/a", 50));
+        let found = read(words.as_bytes(), SOURCE).unwrap();
+        assert_eq!(found.masked.implausible, 0, "a word is no value");
+        let comma = format!("{TABLE}{good}{}", row("5", "31,5", 50));
+        let found = read(comma.as_bytes(), SOURCE).unwrap();
+        assert_eq!(found.masked.implausible, 1);
+        let depth = format!("{TABLE}{good}{}", row("5-7", "31.5", 50));
+        let found = read(depth.as_bytes(), SOURCE).unwrap();
+        assert_eq!(
+            found.masked.implausible, 3,
+            "nobody knows how deep these are"
+        );
+        let many: String = (0..40).map(|minute| row("5", "31,5", minute)).collect();
+        let refused = read(format!("{TABLE}{many}").as_bytes(), SOURCE).unwrap_err();
+        assert_eq!(refused.reason, RejectReason::Values);
+        assert!(refused.detail.contains("\"31,5\""), "{refused}");
+    }
+
+    #[test]
+    fn a_sample_without_a_depth_is_at_the_surface_unless_others_lie_deep() {
+        let table = |depth: &str| format!("{TABLE}{}{}", row(depth, "31.5", 1), row("", "31.5", 2));
+        let found = read(table("20").as_bytes(), SOURCE).unwrap();
+        let at_surface = |found: &Found| {
+            let depths = found.observations.iter().map(|o| o.depth_m);
+            depths.filter(|depth_m| *depth_m < 1.0).count()
+        };
+        assert_eq!((at_surface(&found), found.masked.implausible), (3, 0));
+        let found = read(table("800").as_bytes(), SOURCE).unwrap();
+        assert_eq!((at_surface(&found), found.masked.implausible), (0, 3));
+    }
+
+    #[test]
+    fn columns_that_are_not_read_are_told() {
+        let table = TABLE.replace("SST [deg.C]", "SST [furlong]");
+        let found = read(table.as_bytes(), SOURCE).unwrap();
+        let told: Vec<String> = found.passed_over.iter().map(ToString::to_string).collect();
+        assert!(told.len() == 1 && told[0].contains("furlong"), "{told:?}");
     }
 }

@@ -22,6 +22,8 @@ pub(crate) struct ObservedFile {
     file_name: String,
     raw_sha256: Digest,
     masked: MaskedCells,
+    /// What was measured and is not read, in words.
+    passed_over: Vec<String>,
     observations: Waiting,
 }
 
@@ -86,6 +88,7 @@ impl Pipeline<'_> {
         let Found {
             observations,
             masked,
+            passed_over,
         } = found;
         let Some(first) = observations.first() else {
             unreachable!("a file without observations is refused")
@@ -103,6 +106,7 @@ impl Pipeline<'_> {
             file_name: raw.file_name.clone(),
             raw_sha256: raw.sha256,
             masked,
+            passed_over: passed_over.iter().map(ToString::to_string).collect(),
             observations: tokio::task::spawn_blocking(put_by).await??,
         }))
     }
@@ -127,6 +131,9 @@ impl Pipeline<'_> {
         running.done(ended(&stored));
         let stored = stored?;
         let dataset = file.dataset.clone();
-        Ok(file.notice.observed(dataset, stored, file.masked))
+        let passed_over = file.passed_over.clone();
+        Ok(file
+            .notice
+            .observed(dataset, stored, (file.masked, passed_over)))
     }
 }

@@ -1,8 +1,9 @@
 //! What must not be taken for one another: errors for flags, spreads for values, one variable, place or platform for another.
 
+use contract::event::RejectReason;
 use contract::observation::{Observation, Quality};
 
-use crate::made::{Draft, SST, observations, read, refusal, seen, settings};
+use crate::made::{Draft, SST, observations, passed_over, read, refusal, seen, settings};
 
 /// One buoy with three hours of temperatures.
 fn buoy(attributes: &[(&str, &str)]) -> Draft {
@@ -180,4 +181,56 @@ async fn single_samples_of_one_instant_are_told_apart_by_their_places() {
         row("bb", 1, 20, 12),
     ];
     assert_eq!(seen(&of(named).await), expected);
+}
+
+#[tokio::test]
+async fn parts_of_months_and_years_are_no_instants() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |units: &str, times: Vec<f64>| {
+        Draft::new("timeSeries", &[("time", 3), ("place", 1)])
+            .variable("lon", &["place"], &[("units", "degrees_east")], vec![100.0])
+            .variable("lat", &["place"], &[("units", "degrees_north")], vec![1.0])
+            .variable("time", &["time"], &[("units", units)], times)
+            .variable("sst", &["time"], SST, vec![11.0, 12.0, 13.0])
+            .write(folder.path())
+    };
+    let found = observations(&at("years since 2000-01-01", vec![0.0, 0.5, 2.0])).await;
+    let times: Vec<String> = found.iter().map(|o| o.time.to_string()).collect();
+    assert_eq!(
+        times,
+        [
+            "2000-01-01T00:00:00Z",
+            "2000-07-01T00:00:00Z",
+            "2002-01-01T00:00:00Z"
+        ]
+    );
+    for (units, times) in [
+        ("years since 2000-01-01", vec![0.0, 0.53, 2.0]),
+        ("months since 2000-01-01", vec![0.0, 1.0, 1.5]),
+    ] {
+        let refused = refusal(&at(units, times)).await;
+        assert_eq!(refused.reason, RejectReason::Time);
+        assert!(refused.detail.contains("not equally long"), "{refused}");
+    }
+}
+
+#[tokio::test]
+async fn a_variable_that_was_measured_and_is_not_read_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let draft = buoy(&[]).variable(
+        "wind",
+        &["time"],
+        &[("standard_name", "wind_speed"), ("units", "furlong")],
+        vec![1.0, 2.0, 3.0],
+    );
+    // What has no name, or no place and time, is of something else.
+    let draft = draft
+        .variable("number", &["time"], &[], vec![1.0, 2.0, 3.0])
+        .variable("deployed", &["place"], &[("units", "m")], vec![7.0]);
+    let told = passed_over(&draft.write(folder.path())).await;
+    assert_eq!(told.len(), 1, "{told:?}");
+    assert!(
+        told[0].starts_with("wind: has unit \"furlong\""),
+        "{told:?}"
+    );
 }

@@ -36,11 +36,8 @@ impl ObservationSink for Kept {
     }
 }
 
-/// Observations of a file and what is masked of it, as `fluxglobe ingest` has them, or why there are none.
-pub(crate) async fn read(
-    path: &Path,
-    settings: &Settings,
-) -> Result<(Vec<Observation>, MaskedCells), Rejection> {
+/// What becomes of a file, and its observations.
+async fn outcome(path: &Path, settings: &Settings) -> (Outcome, Vec<Observation>) {
     let (kept, log) = (Arc::new(Kept::default()), Arc::new(EmbeddedLog::memory()));
     let service = IngestService::new(Store::memory(), log, settings.clone())
         .with_observations(Arc::clone(&kept) as Arc<dyn ObservationSink>);
@@ -48,21 +45,40 @@ pub(crate) async fn read(
         .notify(&[path.to_owned()], None, None)
         .await
         .unwrap();
-    match service.drain(&Quiet).await.unwrap().remove(0) {
-        Outcome::Observed { masked, .. } => {
-            Ok((std::mem::take(&mut kept.0.lock().unwrap()), masked))
-        }
-        Outcome::Rejected {
-            reason,
-            object,
-            detail,
-            ..
-        } => Err(Rejection {
+    let outcome = service.drain(&Quiet).await.unwrap().remove(0);
+    let observations = std::mem::take(&mut *kept.0.lock().unwrap());
+    (outcome, observations)
+}
+
+/// Observations of a file and what is masked of it, as `fluxglobe ingest` has them, or why there are none.
+pub(crate) async fn read(
+    path: &Path,
+    settings: &Settings,
+) -> Result<(Vec<Observation>, MaskedCells), Rejection> {
+    match outcome(path, settings).await {
+        (Outcome::Observed { masked, .. }, observations) => Ok((observations, masked)),
+        (
+            Outcome::Rejected {
+                reason,
+                object,
+                detail,
+                ..
+            },
+            _,
+        ) => Err(Rejection {
             reason,
             object,
             detail,
         }),
-        other => panic!("{other}"),
+        (other, _) => panic!("{other}"),
+    }
+}
+
+/// What of a file was measured and is not read.
+pub(crate) async fn passed_over(path: &Path) -> Vec<String> {
+    match outcome(path, &settings()).await {
+        (Outcome::Observed { passed_over, .. }, _) => passed_over,
+        (other, _) => panic!("{other}"),
     }
 }
 

@@ -226,6 +226,14 @@ impl TimeUnit {
         Ok(Self { step, reference })
     }
 
+    /// Does a number of the axis say an instant? Months and years are not equally long, so that a part of one is a time within it and no more.
+    pub(crate) fn is_instant(self, number: f64) -> bool {
+        match self.step {
+            CalendarStep::Months(per_step) => (number * f64::from(per_step)).fract() == 0.0,
+            CalendarStep::Seconds(_) | CalendarStep::PartsOfSecond(_) => true,
+        }
+    }
+
     /// The date of a number of the axis, or what is wrong.
     pub(crate) fn date(self, number: f64) -> Result<CalendarDate, String> {
         let bad = || {
