@@ -113,6 +113,12 @@ fn a_question_on_the_command_line_and_over_http_has_one_answer() {
         let rows = printed.get("rows").or(printed.get("series")).unwrap();
         assert!(!rows.as_array().unwrap().is_empty(), "{printed}");
         assert_eq!(served.json().unwrap(), printed, "{path}");
+        let words = [&words[..words.len() - 1], &["--csv"]].concat();
+        let printed = program::succeed(data, &words).unwrap();
+        let more = if path.contains('?') { '&' } else { '?' };
+        let path = format!("/api/products/{path}{more}format=csv");
+        let served = server.get(&path).unwrap().text().trim_end().to_owned();
+        assert_eq!(printed.trim_end(), served, "{path}");
     }
     made_of_series(data, &server);
     besides(data, &server);
