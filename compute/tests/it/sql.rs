@@ -164,6 +164,10 @@ async fn a_filter_of_any_form_gives_the_rows_that_it_holds_for() {
         "latitude > 70",
         "time_start < time_end AND latitude = 64.5",
         "CASE WHEN latitude > 0 THEN NULL ELSE latitude < -63 END",
+        "time_start IN ('2010-03-01', NULL)",
+        "time_start NOT IN ('2010-03-01', NULL)",
+        "latitude NOT IN (64.5, 63.5, NULL) AND time_start < '2010-03-01'",
+        "longitude <> 160.25 AND (latitude > 60 AND NULL)",
     ] {
         let question = |from: &str| {
             format!(
