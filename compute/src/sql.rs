@@ -10,6 +10,7 @@ mod axes;
 mod batches;
 mod budget;
 mod columns;
+mod compared;
 mod copies;
 mod joined;
 mod limits;

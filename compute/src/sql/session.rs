@@ -31,7 +31,7 @@ use super::tables::Tables;
 use super::told::told;
 use super::worked_out::AnswerFunction;
 use super::yielding::Yielding;
-use super::{analysis, batches, budget, joined, statistics, substituted};
+use super::{analysis, batches, budget, compared, joined, statistics, substituted};
 use crate::expression::udf::number_functions;
 use crate::{ComputeError, Engine};
 
@@ -187,6 +187,7 @@ impl Sql {
             .map_err(|error| ComputeError::Sql {
                 reason: format!("{}: SQL here reads only", error.strip_backtrace()),
             })?;
+        compared::check(&plan)?;
         joined::check(&plan, text.len())?;
         substituted::check(&plan)?;
         batches::check(&plan, text.len())?;

@@ -168,6 +168,9 @@ async fn a_filter_of_any_form_gives_the_rows_that_it_holds_for() {
         "time_start NOT IN ('2010-03-01', NULL)",
         "latitude NOT IN (64.5, 63.5, NULL) AND time_start < '2010-03-01'",
         "longitude <> 160.25 AND (latitude > 60 AND NULL)",
+        "time_end > time_start + INTERVAL '30 days' AND latitude > 63",
+        "extract(epoch FROM time_end - time_start) < 30 * 86400 AND latitude > 63",
+        "time_end - time_start >= INTERVAL '744 hours' AND latitude > 63",
     ] {
         let question = |from: &str| {
             format!(
@@ -412,6 +415,18 @@ const REFUSED: &[(&str, &str)] = &[
     (
         "SELECT mean_weighted(value, -1) FROM sst_test",
         "is no weight",
+    ),
+    (
+        "SELECT count(*) FROM sst_test WHERE time_end - time_start > INTERVAL '2 days'",
+        "48 hours are less than 2 days",
+    ),
+    (
+        "SELECT time_start FROM sst_test WHERE time_end - time_start BETWEEN INTERVAL '1 day' AND INTERVAL '40 days'",
+        "extract(epoch FROM time_end - time_start)",
+    ),
+    (
+        "SELECT count(*) FROM sst_test a JOIN sst_test b ON b.time_start - a.time_start < INTERVAL '3 days'",
+        "intervals have no order",
     ),
     ("SELECT 1 / 0", "ivide by zero"),
     ("SELECT * FROM stats('sst-test')", "stats takes texts"),

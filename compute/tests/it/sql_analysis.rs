@@ -149,7 +149,8 @@ async fn what_may_surprise_about_statistics_and_budgets_stands_in_every_row_too(
     for (place, note) in [(crossing, "rings cross"), (BOX, "")] {
         let told = texts(&sql, &format!("SELECT notes FROM stats('flux', '{place}')")).await;
         assert_eq!(told.len(), 2);
-        let is_told = |row: &Vec<String>| row[0].contains(note) && row[0].is_empty() == note.is_empty();
+        let is_told =
+            |row: &Vec<String>| row[0].contains(note) && row[0].is_empty() == note.is_empty();
         assert!(told.iter().all(is_told), "{place}: {told:?}");
     }
 }
