@@ -16,6 +16,7 @@ mod joined;
 mod limits;
 mod mean_weighted;
 mod named;
+mod overlooked;
 mod pinned;
 mod place;
 mod planning;

@@ -417,6 +417,30 @@ const REFUSED: &[(&str, &str)] = &[
         "is no weight",
     ),
     (
+        "SELECT count(*) FROM sst_test TABLESAMPLE BERNOULLI (10)",
+        "all rows would be read",
+    ),
+    (
+        "EXPLAIN SELECT * FROM (SELECT value FROM sst_test PREWHERE latitude > 80) t",
+        "write WHERE",
+    ),
+    (
+        "SELECT count(*) FROM sst_test PARTITION (north)",
+        "PARTITION of a table is not known",
+    ),
+    (
+        "WITH t AS (SELECT latitude, count(*) FROM sst_test GROUP BY latitude WITH ROLLUP) SELECT * FROM t",
+        "write GROUP BY ROLLUP",
+    ),
+    (
+        "SELECT value FROM sst_test START WITH latitude > 80 CONNECT BY PRIOR latitude = longitude",
+        "write WITH RECURSIVE",
+    ),
+    (
+        "SELECT count(*) FROM sst_test WHERE latitude > ANY (SELECT latitude FROM sst_test WHERE latitude > 60)",
+        "SELECT min(...)",
+    ),
+    (
         "SELECT count(*) FROM sst_test WHERE time_end - time_start > INTERVAL '2 days'",
         "48 hours are less than 2 days",
     ),
