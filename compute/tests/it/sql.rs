@@ -1091,4 +1091,19 @@ async fn two_products_are_joined_by_time_and_place() {
     assert_eq!(texts(&sql, joined).await, [expected]);
     let count = ask(&sql, joined).await.unwrap();
     assert_eq!(count.column(0).as_primitive::<Int64Type>().value(0), 58_500);
+    // What has no partner comes through no filter of the partner, on whichever side of the join it stands.
+    let filtered = |tables: &str| {
+        format!(
+            "SELECT count(*), count(a.latitude) FROM {tables} ON a.time_start = b.time_start AND a.latitude = b.latitude
+                AND a.longitude = b.longitude AND a.value > 285
+            WHERE CASE WHEN a.latitude > 24.0 THEN a.longitude ELSE a.latitude END > 10"
+        )
+    };
+    let right = texts(&sql, &filtered("sst_test a RIGHT JOIN sst_test b")).await;
+    let left = texts(&sql, &filtered("sst_test b LEFT JOIN sst_test a")).await;
+    assert_eq!(right, left);
+    assert!(
+        right[0][0] == right[0][1] && right[0][0] != "0",
+        "{right:?}"
+    );
 }
