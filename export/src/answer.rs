@@ -84,7 +84,7 @@ pub fn answer(
     let sink = Sink::open(to)?;
     Ok(match format {
         AnswerFormat::Csv => Box::new(text::Csv::new(sink, columns)?),
-        AnswerFormat::Json => Box::new(text::Json::new(sink)),
+        AnswerFormat::Json => Box::new(text::Json::new(sink, columns)?),
         AnswerFormat::Arrow => Box::new(columnar::Arrow::new(sink, columns)?),
         AnswerFormat::Parquet | AnswerFormat::NetCdf => {
             Box::new(columnar::Parquet::new(sink, columns)?)

@@ -113,9 +113,19 @@ fn a_question_on_the_command_line_and_over_http_has_one_answer() {
         let rows = printed.get("rows").or(printed.get("series")).unwrap();
         assert!(!rows.as_array().unwrap().is_empty(), "{printed}");
         assert_eq!(served.json().unwrap(), printed, "{path}");
+        with_commas(data, &server, &words[..words.len() - 1], path);
     }
     made_of_series(data, &server);
     besides(data, &server);
+}
+
+/// The same with commas.
+fn with_commas(data: &Path, server: &Server, words: &[&str], path: &str) {
+    let printed = program::succeed(data, &[words, &["--csv"]].concat()).unwrap();
+    let more = if path.contains('?') { '&' } else { '?' };
+    let path = format!("/api/products/{path}{more}format=csv");
+    let served = server.get(&path).unwrap().text();
+    assert_eq!(printed.trim_end(), served.trim_end(), "{path}");
 }
 
 /// The same of what is asked of a budget besides a region: errors, rivers, parts, versions.

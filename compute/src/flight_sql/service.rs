@@ -78,12 +78,16 @@ impl Questions {
     }
 
     /// What a question answers, and the ticket that has it answered: its text.
-    async fn info(&self, text: String) -> Result<Response<FlightInfo>, Status> {
+    async fn info(
+        &self,
+        text: String,
+        asked: Request<FlightDescriptor>,
+    ) -> Result<Response<FlightInfo>, Status> {
         let columns = self.columns(&text).await?;
         let ticket = TicketStatementQuery {
             statement_handle: text.into(),
         };
-        info(&columns, &ticket)
+        info(&columns, &ticket, asked)
     }
 
     async fn rows(&self, text: &str) -> Result<Response<Answer>, Status> {
@@ -112,10 +116,16 @@ fn about() -> Result<SqlInfoData, ComputeError> {
     built.map_err(|e| ComputeError::inconsistent("what the server says of itself", e))
 }
 
-fn info(columns: &Schema, ticket: &impl ProstMessageExt) -> Result<Response<FlightInfo>, Status> {
+/// `asked` is what it was asked for with: clients written in C++, pyarrow's among them, take no answer without it.
+fn info(
+    columns: &Schema,
+    ticket: &impl ProstMessageExt,
+    asked: Request<FlightDescriptor>,
+) -> Result<Response<FlightInfo>, Status> {
     let ticket = Ticket::new(ticket.as_any().encode_to_vec());
     let info = FlightInfo::new().try_with_schema(columns);
     let info = info.map_err(|e| Status::internal(e.to_string()))?;
+    let info = info.with_descriptor(asked.into_inner());
     let endpoint = FlightEndpoint::new().with_ticket(ticket);
     Ok(Response::new(info.with_endpoint(endpoint)))
 }
@@ -150,18 +160,18 @@ impl FlightSqlService for Questions {
     async fn get_flight_info_statement(
         &self,
         query: CommandStatementQuery,
-        _request: Request<FlightDescriptor>,
+        request: Request<FlightDescriptor>,
     ) -> Result<Response<FlightInfo>, Status> {
-        self.info(query.query).await
+        self.info(query.query, request).await
     }
 
     async fn get_flight_info_prepared_statement(
         &self,
         query: CommandPreparedStatementQuery,
-        _request: Request<FlightDescriptor>,
+        request: Request<FlightDescriptor>,
     ) -> Result<Response<FlightInfo>, Status> {
-        self.info(text_of(&query.prepared_statement_handle)?.to_owned())
-            .await
+        let text = text_of(&query.prepared_statement_handle)?.to_owned();
+        self.info(text, request).await
     }
 
     async fn do_get_statement(
@@ -237,9 +247,9 @@ impl FlightSqlService for Questions {
     async fn get_flight_info_catalogs(
         &self,
         query: CommandGetCatalogs,
-        _request: Request<FlightDescriptor>,
+        request: Request<FlightDescriptor>,
     ) -> Result<Response<FlightInfo>, Status> {
-        info(&query.into_builder().schema(), &query)
+        info(&query.into_builder().schema(), &query, request)
     }
 
     async fn do_get_catalogs(
@@ -255,9 +265,9 @@ impl FlightSqlService for Questions {
     async fn get_flight_info_schemas(
         &self,
         query: CommandGetDbSchemas,
-        _request: Request<FlightDescriptor>,
+        request: Request<FlightDescriptor>,
     ) -> Result<Response<FlightInfo>, Status> {
-        info(&query.clone().into_builder().schema(), &query)
+        info(&query.clone().into_builder().schema(), &query, request)
     }
 
     async fn do_get_schemas(
@@ -273,9 +283,9 @@ impl FlightSqlService for Questions {
     async fn get_flight_info_tables(
         &self,
         query: CommandGetTables,
-        _request: Request<FlightDescriptor>,
+        request: Request<FlightDescriptor>,
     ) -> Result<Response<FlightInfo>, Status> {
-        info(&query.clone().into_builder().schema(), &query)
+        info(&query.clone().into_builder().schema(), &query, request)
     }
 
     async fn do_get_tables(
@@ -295,9 +305,9 @@ impl FlightSqlService for Questions {
     async fn get_flight_info_table_types(
         &self,
         query: CommandGetTableTypes,
-        _request: Request<FlightDescriptor>,
+        request: Request<FlightDescriptor>,
     ) -> Result<Response<FlightInfo>, Status> {
-        info(&query.into_builder().schema(), &query)
+        info(&query.into_builder().schema(), &query, request)
     }
 
     async fn do_get_table_types(
@@ -313,9 +323,13 @@ impl FlightSqlService for Questions {
     async fn get_flight_info_sql_info(
         &self,
         query: CommandGetSqlInfo,
-        _request: Request<FlightDescriptor>,
+        request: Request<FlightDescriptor>,
     ) -> Result<Response<FlightInfo>, Status> {
-        info(&query.clone().into_builder(&self.about).schema(), &query)
+        info(
+            &query.clone().into_builder(&self.about).schema(),
+            &query,
+            request,
+        )
     }
 
     async fn do_get_sql_info(

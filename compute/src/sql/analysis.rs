@@ -19,7 +19,7 @@ use futures::future::BoxFuture;
 use super::columns::instant;
 use super::named::Named;
 use super::place::Place;
-use super::worked_out::{Asked, Kind, Question, batch, instants};
+use super::worked_out::{Asked, Kind, Question, batch, instants, told_in_each_row};
 use crate::analysis::analyse;
 use crate::{ComputeError, Engine};
 
@@ -174,12 +174,10 @@ impl Analysis {
             Made::Anomaly => by_step.map(|made| anomaly(&made, &cited.unit)),
             Made::Trend => line.map(|made| trend(&made)),
         };
-        // Steps that cover little of a region, or none, are told with every row: nobody sees an answer beside its table here.
+        // Such as steps that cover little of a region, or none.
         let with_notes = |mut columns: Vec<ArrayRef>| {
             let count = columns.first().map_or(0, |column| column.len());
-            let notes = (!notes.is_empty()).then(|| notes.join("; "));
-            let notes = std::iter::repeat_n(notes, count).collect::<StringArray>();
-            columns.push(Arc::new(notes));
+            columns.push(told_in_each_row(&notes, count));
             columns
         };
         // What is not defined is no empty table.

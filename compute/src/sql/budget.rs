@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use contract::budget::{BudgetAnswer, BudgetQuery, BudgetRow};
+use contract::budget::{BudgetAnswer, BudgetQuery, BudgetRow, Completeness};
 use contract::manifest::Manifest;
 use contract::region::AskedRegion;
 use datafusion::arrow::array::{ArrayRef, Float64Array, RecordBatch, StringArray};
@@ -12,7 +12,7 @@ use futures::future::BoxFuture;
 
 use super::columns::instant;
 use super::named::Named;
-use super::worked_out::{Asked, Kind, Question, batch, instants};
+use super::worked_out::{Asked, Kind, Question, batch, instants, told_in_each_row};
 use crate::budget::budget_of;
 use crate::{ComputeError, Engine};
 
@@ -27,7 +27,7 @@ pub(super) static KIND: Kind = Kind {
 pub(super) const ABOUT: [&str; 4] = [
     "budget",
     "budget('product', 'region', 'step') as a table",
-    "the rows of `fluxglobe budget`: carbon that left the sea, Tg and exact kg; step total if left out",
+    "the rows of `fluxglobe budget`: carbon that left the sea, Tg and exact kg, how complete sums of accumulated carbon are, and in notes what may surprise, such as periods without a row; step total if left out",
     "",
 ];
 
@@ -58,6 +58,10 @@ impl Question for BudgetQuery {
             number("ocean_with_data_m2"),
             Field::new("gap_tg", DataType::Float64, true),
             number("gap_area_m2"),
+            // Of accumulated carbon, of versions that counted it.
+            Field::new("complete_m2", DataType::Float64, true),
+            Field::new("incomplete_m2", DataType::Float64, true),
+            Field::new("notes", DataType::Utf8, true),
         ]))
     }
 
@@ -86,6 +90,10 @@ fn columns(answer: &BudgetAnswer) -> Result<Vec<ArrayRef>, ComputeError> {
     let numbers = |number: fn(&BudgetRow) -> f64| -> ArrayRef {
         Arc::new(Float64Array::from_iter_values(rows.iter().map(number)))
     };
+    let of_sums = |area: fn(&Completeness) -> f64| -> ArrayRef {
+        let areas = rows.iter().map(|row| row.completeness.as_ref().map(area));
+        Arc::new(areas.collect::<Float64Array>())
+    };
     let kg = StringArray::from_iter_values(rows.iter().map(|row| &row.budget_kg));
     let failed = ComputeError::engine("telling a budget");
     Ok(vec![
@@ -99,5 +107,8 @@ fn columns(answer: &BudgetAnswer) -> Result<Vec<ArrayRef>, ComputeError> {
         numbers(|row| row.ocean_with_data_m2),
         Arc::new(rows.iter().map(|row| row.gap_tg).collect::<Float64Array>()),
         numbers(|row| row.gap_area_m2),
+        of_sums(|own| own.complete_m2),
+        of_sums(|own| own.incomplete_m2),
+        told_in_each_row(&answer.notes, rows.len()),
     ])
 }

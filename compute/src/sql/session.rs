@@ -15,6 +15,8 @@ use datafusion::execution::memory_pool::{GreedyMemoryPool, TrackConsumersPool};
 use datafusion::execution::runtime_env::RuntimeEnvBuilder;
 use datafusion::execution::session_state::{SessionState, SessionStateBuilder};
 use datafusion::logical_expr::AggregateUDF;
+use datafusion::physical_optimizer::PhysicalOptimizerRule;
+use datafusion::physical_optimizer::optimizer::PhysicalOptimizer;
 use datafusion::physical_plan::execute_stream;
 use datafusion::prelude::SessionConfig;
 use futures::future::BoxFuture;
@@ -31,7 +33,7 @@ use super::tables::Tables;
 use super::told::told;
 use super::worked_out::AnswerFunction;
 use super::yielding::Yielding;
-use super::{analysis, batches, budget, joined, statistics, substituted};
+use super::{analysis, batches, budget, compared, joined, statistics, substituted};
 use crate::expression::udf::number_functions;
 use crate::{ComputeError, Engine};
 
@@ -49,6 +51,14 @@ pub struct Sql {
     limits: SqlLimits,
     /// Settings and functions; sessions add tables, functions that stand for tables, and memory.
     state: SessionState,
+}
+
+/// The rules of the engine for plans that run, without one: it brings filters below joins whose sides were exchanged, to the wrong side, so that of a
+/// `RIGHT JOIN` rows without a partner came through a filter of that partner. Filters were brought to tables before, in plans that say what is asked.
+fn sound_rules() -> Vec<Arc<dyn PhysicalOptimizerRule + Send + Sync>> {
+    let all = PhysicalOptimizer::new().rules.into_iter();
+    all.filter(|rule| !rule.name().starts_with("FilterPushdown"))
+        .collect()
 }
 
 /// A question that was understood, and what it would answer.
@@ -72,7 +82,9 @@ impl Sql {
         if let Some(functions) = builder.aggregate_functions() {
             functions.push(Arc::new(AggregateUDF::from(MeanWeighted::new())));
         }
-        let builder = builder.with_physical_optimizer_rule(Arc::new(Yielding));
+        let builder = builder
+            .with_physical_optimizer_rules(sound_rules())
+            .with_physical_optimizer_rule(Arc::new(Yielding));
         Ok(Self {
             engine: engine.clone(),
             limits,
@@ -187,6 +199,7 @@ impl Sql {
             .map_err(|error| ComputeError::Sql {
                 reason: format!("{}: SQL here reads only", error.strip_backtrace()),
             })?;
+        compared::check(&plan)?;
         joined::check(&plan, text.len())?;
         substituted::check(&plan)?;
         batches::check(&plan, text.len())?;

@@ -5,8 +5,8 @@ use datafusion::sql::sqlparser::ast::{
     DescribeAlias, SetExpr, ShowStatementOptions, Statement as Ansi,
 };
 
-use super::copies;
 use super::told::told;
+use super::{copies, overlooked};
 use crate::{ComputeError, depth};
 
 /// Longest text of a question: nobody writes more by hand, and programs need not.
@@ -67,6 +67,7 @@ pub(super) fn statement(text: &str) -> Result<Statement, ComputeError> {
         return refused("it is more than one statement; ask one at a time");
     }
     check(&statement)?;
+    overlooked::check(&statement)?;
     described(statement)
 }
 

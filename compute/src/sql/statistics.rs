@@ -17,7 +17,7 @@ use futures::future::BoxFuture;
 use super::columns::instant;
 use super::named::Named;
 use super::place::Place;
-use super::worked_out::{Asked, Kind, Question, batch, instants};
+use super::worked_out::{Asked, Kind, Question, batch, instants, told_in_each_row};
 use crate::reduce::statistics_of;
 use crate::{ComputeError, Engine};
 
@@ -32,7 +32,7 @@ pub(super) static KIND: Kind = Kind {
 pub(super) const ABOUT: [&str; 4] = [
     "stats",
     "stats('product', 'region'|'LON,LAT'|'LON,LAT;LON,LAT;...', 'step', 'statistics') as a table",
-    "the rows of `fluxglobe stats` in the units that people read, which units says of each statistic and unit where they have one; step native and statistics mean if left out",
+    "the rows of `fluxglobe stats` in the units that people read, which units says of each statistic and unit where they have one, and in notes what may surprise; step native and statistics mean if left out",
     "",
 ];
 
@@ -68,6 +68,7 @@ impl Question for StatisticsQuery {
             // A sum is of the unit times an area, a count of 1: which unit that is only the version says, and a plan knows none.
             Field::new("unit", DataType::Utf8, true),
             Field::new("units", DataType::Utf8, false),
+            Field::new("notes", DataType::Utf8, true),
         ]);
         Arc::new(Schema::new(fields))
     }
@@ -114,6 +115,7 @@ fn columns(answer: &StatisticsAnswer, statistics: &Statistics) -> Vec<ArrayRef> 
     columns.push(Arc::new(unit.collect::<StringArray>()));
     let units = std::iter::repeat_n(units(answer), rows.len());
     columns.push(Arc::new(StringArray::from_iter_values(units)));
+    columns.push(told_in_each_row(&answer.notes, rows.len()));
     columns
 }
 

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use async_trait::async_trait;
 use contract::manifest::Manifest;
 use contract::region::{AskedRegion, MaskCode};
-use datafusion::arrow::array::{ArrayRef, RecordBatch, TimestampMillisecondArray};
+use datafusion::arrow::array::{ArrayRef, RecordBatch, StringArray, TimestampMillisecondArray};
 use datafusion::arrow::datatypes::SchemaRef;
 use datafusion::catalog::memory::MemorySourceConfig;
 use datafusion::catalog::{Session, TableFunctionArgs, TableFunctionImpl, TableProvider};
@@ -173,6 +173,12 @@ impl TableProvider for AnswerTable {
 /// A column of instants, ms.
 pub(super) fn instants(ms: impl Iterator<Item = i64>) -> ArrayRef {
     Arc::new(TimestampMillisecondArray::from_iter_values(ms).with_timezone("UTC"))
+}
+
+/// A column that says in every row what may surprise about an answer, which nobody sees beside its table here; null where nothing does.
+pub(super) fn told_in_each_row(notes: &[String], count: usize) -> ArrayRef {
+    let notes = (!notes.is_empty()).then(|| notes.join("; "));
+    Arc::new(std::iter::repeat_n(notes, count).collect::<StringArray>())
 }
 
 /// Rows of columns in the order of their schema.

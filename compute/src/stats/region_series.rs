@@ -11,11 +11,14 @@ use futures::future::BoxFuture;
 
 use crate::budget::Measure;
 use crate::budget::fixed::{AREA_DECIMALS, MASS_DECIMALS};
-use crate::budget::over_region::{AskedArea, over_region};
+use crate::budget::over_region::{AskedArea, extent_of, over_region};
 use crate::budget::rows::{StepSum, coverage_percent};
 use crate::reduce::{RegionMeans, StepMean, means_over_region};
 use crate::summed::check_averaged;
 use crate::{ComputeError, Engine, catalogue};
+
+/// Below this area a sum in steps of 1e-9 of the unit may hold too few of them, m²: 1e-8 of a flux of 1e-9 kg m⁻² s⁻¹.
+const SMALL_M2: f64 = 1e8;
 
 /// The series of a product over a region.
 pub fn region_series<'a>(
@@ -37,10 +40,16 @@ pub fn region_series_of<'a>(
     Box::pin(async move {
         check_averaged(manifest)?;
         let id = manifest.id();
-        let means = match manifest.quantity {
-            // Sums as budgets have them are in steps of 1e-9 of the unit: nothing of a concentration of 1e-17, too many of a heat of 1e11.
-            Quantity::Open(_) => in_own_steps(engine, query, manifest, &id).await?,
-            _ => in_steps_of_masses(engine, query, manifest).await?,
+        // Sums as budgets have them are in steps of 1e-9 of the unit: nothing of a concentration of 1e-17, too many of a heat of 1e11, and of
+        // a flux of 1e-9 in a square of 10 m a hundred.
+        let has_own_steps = match manifest.quantity {
+            Quantity::Open(_) => true,
+            _ => extent_of(engine, asked_area(query)).await?.area_m2 < SMALL_M2,
+        };
+        let means = if has_own_steps {
+            in_own_steps(engine, query, manifest, &id).await?
+        } else {
+            in_steps_of_masses(engine, query, manifest).await?
         };
         let display = manifest.quantity.display();
         let value = |step: &StepMean| RegionValue {
@@ -64,7 +73,15 @@ pub fn region_series_of<'a>(
     })
 }
 
-/// Means of a quantity whose values may be of any size.
+fn asked_area(query: &RegionSeriesQuery) -> AskedArea<'_> {
+    AskedArea {
+        region: &query.region,
+        earth: query.earth,
+        ocean: query.ocean.as_deref(),
+    }
+}
+
+/// Means of a quantity whose values may be of any size, or over a region that may be.
 async fn in_own_steps(
     engine: &Engine,
     query: &RegionSeriesQuery,
@@ -93,12 +110,7 @@ async fn in_steps_of_masses(
     manifest: &Manifest,
 ) -> Result<RegionMeans, ComputeError> {
     let (_window, steps) = manifest.steps_inside(query.from, query.to)?;
-    let area = AskedArea {
-        region: &query.region,
-        earth: query.earth,
-        ocean: query.ocean.as_deref(),
-    };
-    let over = over_region(engine, manifest, &steps, area, Measure::Mean).await?;
+    let over = over_region(engine, manifest, &steps, asked_area(query), Measure::Mean).await?;
     let mean = |sum: &StepSum| {
         let (mean, area_m2) = mean_and_area(sum);
         StepMean {

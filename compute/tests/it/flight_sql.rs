@@ -104,6 +104,8 @@ async fn rows(
     client: &mut Client,
     info: arrow_flight::FlightInfo,
 ) -> Result<RecordBatch, FlightError> {
+    // Clients written in C++ take no answer that does not say what it is the answer to.
+    assert!(info.flight_descriptor.is_some());
     let ticket = info.endpoint[0].ticket.clone().unwrap();
     let stream = client.do_get(ticket).await?;
     let batches: Vec<RecordBatch> = stream.try_collect().await?;

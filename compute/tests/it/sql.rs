@@ -164,6 +164,13 @@ async fn a_filter_of_any_form_gives_the_rows_that_it_holds_for() {
         "latitude > 70",
         "time_start < time_end AND latitude = 64.5",
         "CASE WHEN latitude > 0 THEN NULL ELSE latitude < -63 END",
+        "time_start IN ('2010-03-01', NULL)",
+        "time_start NOT IN ('2010-03-01', NULL)",
+        "latitude NOT IN (64.5, 63.5, NULL) AND time_start < '2010-03-01'",
+        "longitude <> 160.25 AND (latitude > 60 AND NULL)",
+        "time_end > time_start + INTERVAL '30 days' AND latitude > 63",
+        "extract(epoch FROM time_end - time_start) < 30 * 86400 AND latitude > 63",
+        "time_end - time_start >= INTERVAL '744 hours' AND latitude > 63",
     ] {
         let question = |from: &str| {
             format!(
@@ -408,6 +415,42 @@ const REFUSED: &[(&str, &str)] = &[
     (
         "SELECT mean_weighted(value, -1) FROM sst_test",
         "is no weight",
+    ),
+    (
+        "SELECT count(*) FROM sst_test TABLESAMPLE BERNOULLI (10)",
+        "all rows would be read",
+    ),
+    (
+        "EXPLAIN SELECT * FROM (SELECT value FROM sst_test PREWHERE latitude > 80) t",
+        "write WHERE",
+    ),
+    (
+        "SELECT count(*) FROM sst_test PARTITION (north)",
+        "PARTITION of a table is not known",
+    ),
+    (
+        "WITH t AS (SELECT latitude, count(*) FROM sst_test GROUP BY latitude WITH ROLLUP) SELECT * FROM t",
+        "write GROUP BY ROLLUP",
+    ),
+    (
+        "SELECT value FROM sst_test START WITH latitude > 80 CONNECT BY PRIOR latitude = longitude",
+        "write WITH RECURSIVE",
+    ),
+    (
+        "SELECT count(*) FROM sst_test WHERE latitude > ANY (SELECT latitude FROM sst_test WHERE latitude > 60)",
+        "SELECT min(...)",
+    ),
+    (
+        "SELECT count(*) FROM sst_test WHERE time_end - time_start > INTERVAL '2 days'",
+        "48 hours are less than 2 days",
+    ),
+    (
+        "SELECT time_start FROM sst_test WHERE time_end - time_start BETWEEN INTERVAL '1 day' AND INTERVAL '40 days'",
+        "extract(epoch FROM time_end - time_start)",
+    ),
+    (
+        "SELECT count(*) FROM sst_test a JOIN sst_test b ON b.time_start - a.time_start < INTERVAL '3 days'",
+        "intervals have no order",
     ),
     ("SELECT 1 / 0", "ivide by zero"),
     ("SELECT * FROM stats('sst-test')", "stats takes texts"),
@@ -1048,4 +1091,19 @@ async fn two_products_are_joined_by_time_and_place() {
     assert_eq!(texts(&sql, joined).await, [expected]);
     let count = ask(&sql, joined).await.unwrap();
     assert_eq!(count.column(0).as_primitive::<Int64Type>().value(0), 58_500);
+    // What has no partner comes through no filter of the partner, on whichever side of the join it stands.
+    let filtered = |tables: &str| {
+        format!(
+            "SELECT count(*), count(a.latitude) FROM {tables} ON a.time_start = b.time_start AND a.latitude = b.latitude
+                AND a.longitude = b.longitude AND a.value > 285
+            WHERE CASE WHEN a.latitude > 24.0 THEN a.longitude ELSE a.latitude END > 10"
+        )
+    };
+    let right = texts(&sql, &filtered("sst_test a RIGHT JOIN sst_test b")).await;
+    let left = texts(&sql, &filtered("sst_test b LEFT JOIN sst_test a")).await;
+    assert_eq!(right, left);
+    assert!(
+        right[0][0] == right[0][1] && right[0][0] != "0",
+        "{right:?}"
+    );
 }

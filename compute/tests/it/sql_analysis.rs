@@ -1,10 +1,10 @@
 //! What is made of series, as tables of SQL: the numbers that `fluxglobe stats` tells, and what may surprise about them.
 
-use compute::Engine;
+use compute::{Engine, budget, derive_accumulated};
 use contract::quantity::Quantity;
 use contract::time::Period;
 
-use crate::fixture::{folder_store, land, months, parts, product};
+use crate::fixture::{folder_store, land, months, parts, product, total};
 use crate::sql::{GRID, analysed, ask, one, sql_of, texts};
 
 fn analysis_of(word: &str, columns: &str) -> String {
@@ -99,5 +99,58 @@ async fn what_may_surprise_stands_in_every_row() {
         // Where every step holds data there is nothing to tell.
         let told = texts(&sql, &of("162.3,64.5")).await;
         assert!(told.iter().all(|row| row[0].is_empty()), "{told:?}");
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn what_may_surprise_about_statistics_and_budgets_stands_in_every_row_too() {
+    const BOX: &str = "162,-10,170,10";
+    let (_folder, store) = folder_store();
+    // The second of three months never landed, and in the third every other cell has a gap.
+    let year = months(2010);
+    let step = |month: usize, has_gaps: bool| {
+        let cells = 0..GRID.cell_count();
+        let is_gap = |cell: usize| has_gaps && cell.is_multiple_of(2);
+        let values = cells.map(|cell| if is_gap(cell) { f32::NAN } else { 1e-9 });
+        (year[month], values.collect())
+    };
+    let steps: Vec<(Period, Vec<f32>)> = vec![step(0, false), step(2, true)];
+    let flux = product("flux");
+    land(&store, &flux, Quantity::CarbonFlux, GRID, &steps).await;
+    let engine = Engine::local(store);
+    let sums = derive_accumulated(&engine, &flux, None, &|_progress| ()).await;
+    let sql = sql_of(&engine);
+
+    let asked = format!("SELECT notes, complete_m2 FROM budget('flux', '{BOX}', 'month')");
+    let told = texts(&sql, &asked).await;
+    let lacks = "no step of the product reaches into 1 of the 3 periods";
+    assert_eq!(told.len(), 2);
+    assert!(told.iter().all(|row| row[0].contains(lacks)), "{told:?}");
+    assert!(told.iter().all(|row| row[1].is_empty()), "{told:?}");
+    // Where every period has a row there is nothing to tell.
+    let asked = format!("SELECT notes FROM budget('flux', '{BOX}')");
+    assert_eq!(one(&sql, &asked).await, "");
+
+    // A month that nobody landed leaves no sum complete.
+    let answer = budget(&engine, &total(&sums.unwrap().product, BOX)).await;
+    let own = answer.unwrap().rows[0].completeness.unwrap();
+    assert!(own.complete_m2 == 0.0 && own.incomplete_m2 > 0.0, "{own:?}");
+    let asked = format!(
+        "SELECT complete_m2, incomplete_m2 FROM budget('flux-accumulated', '{BOX}', 'total')"
+    );
+    let told = texts(&sql, &asked).await;
+    let told = told[0].iter().map(|text| text.parse().unwrap());
+    assert_eq!(
+        told.collect::<Vec<f64>>(),
+        [own.complete_m2, own.incomplete_m2]
+    );
+
+    let crossing = "POLYGON((162 -10,170 10,170 -10,162 10,162 -10))";
+    for (place, note) in [(crossing, "rings cross"), (BOX, "")] {
+        let told = texts(&sql, &format!("SELECT notes FROM stats('flux', '{place}')")).await;
+        assert_eq!(told.len(), 2);
+        let is_told =
+            |row: &Vec<String>| row[0].contains(note) && row[0].is_empty() == note.is_empty();
+        assert!(told.iter().all(is_told), "{place}: {told:?}");
     }
 }

@@ -164,7 +164,13 @@ async fn statistics_of_a_polygon_are_those_of_plain_sums() {
 async fn means_and_coverage_are_those_of_the_series_that_was_always_given() {
     let (_folder, store, _manifest, _steps) = landed().await;
     let engine = Engine::in_process(store, parts(2));
-    for region in ["global", POLYGON, "170.5,-33.3,-120.1,12.7"] {
+    // The last of them is ten metres wide.
+    for region in [
+        "global",
+        POLYGON,
+        "170.5,-33.3,-120.1,12.7",
+        "-148.7001,-16.2001,-148.7,-16.2",
+    ] {
         let query = asked(area(region), "mean", TimeStep::Native);
         let answer = statistics(&engine, &query).await.unwrap();
         let series =

@@ -62,12 +62,28 @@ pub(super) struct Json {
 }
 
 impl Json {
-    pub(super) fn new(sink: Sink) -> Self {
+    /// # Errors
+    /// Columns of one name: who reads an object keeps the last of them.
+    pub(super) fn new(sink: Sink, columns: &SchemaRef) -> Result<Self, ExportError> {
+        let fields = columns.fields();
+        let mut numbered = fields.iter().enumerate();
+        let twice = numbered.find(|(place, own)| {
+            let before = &fields[..*place];
+            before.iter().any(|it| it.name() == own.name())
+        });
+        if let Some((_place, field)) = twice {
+            return Err(ExportError::Form {
+                reason: format!(
+                    "two columns are called {}, of which readers of JSON keep one: give one another name with AS",
+                    field.name()
+                ),
+            });
+        }
         let builder = WriterBuilder::new().with_explicit_nulls(true);
-        Self {
+        Ok(Self {
             path: sink.path(),
             writer: builder.build(sink),
-        }
+        })
     }
 }
 
@@ -81,5 +97,30 @@ impl Answer for Json {
         let Self { path, mut writer } = *self;
         writer.finish().map_err(ExportError::library(&path))?;
         writer.into_inner().finish()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use arrow::datatypes::{DataType, Field, Schema};
+
+    use crate::answer::{AnswerFormat, Destination, answer};
+
+    #[test]
+    fn columns_of_one_name_are_refused_where_readers_would_keep_one() {
+        let refused = |format, names: [&str; 2]| {
+            let fields = names.map(|name| Field::new(name, DataType::Float64, true));
+            let columns = Arc::new(Schema::new(fields.to_vec()));
+            let to = Destination::Stream(Box::new(std::io::sink()));
+            let begun = answer(format, to, &columns);
+            begun.err().map(|error| error.to_string())
+        };
+        let told = refused(AnswerFormat::Json, ["value", "value"]).unwrap();
+        assert!(told.contains("two columns are called value"), "{told}");
+        assert_eq!(refused(AnswerFormat::Json, ["value", "other"]), None);
+        // A line of CSV has both.
+        assert_eq!(refused(AnswerFormat::Csv, ["value", "value"]), None);
     }
 }

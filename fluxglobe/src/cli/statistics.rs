@@ -51,11 +51,10 @@ pub(crate) struct StatisticsOptions {
 }
 
 impl StatisticsOptions {
-    /// What is asked; comma-separated values are of statistics.
+    /// What is asked, in whatever form it is printed.
     pub(crate) fn wishes(&self) -> StatisticsWishes {
-        let usual = self.csv.then(Statistics::default);
         StatisticsWishes {
-            statistics: self.statistic.clone().or(usual),
+            statistics: self.statistic.clone(),
             step: self.step,
             min_coverage: self.min_coverage,
             ..StatisticsWishes::default()
@@ -133,8 +132,8 @@ pub(crate) struct StatsPolygon {
     #[arg(long, allow_hyphen_values = true)]
     pub(crate) region: String,
     /// First instant: 2000, 2000-03, 2000-03-15 or with a time of day. The product's first if absent. A step that lies partly in the
-    /// period has a whole row, and counts whole in what is made of the series (--climatology and its like); with --statistic, --step, --cells,
-    /// --min-coverage or --csv it counts by its time inside, and its row ends with the period.
+    /// period has a whole row, and counts whole in what is made of the series (--climatology and its like); with --statistic, --step, --cells
+    /// or --min-coverage it counts by its time inside, and its row ends with the period.
     #[arg(long)]
     pub(crate) from: Option<TimeMs>,
     /// First instant after the period. The product's end if absent.

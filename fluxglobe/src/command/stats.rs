@@ -61,7 +61,7 @@ async fn point(settings: &Settings, options: &StatsPoint) -> Result<()> {
             ..wishes
         };
         let point = whole.at_point(product.clone(), place);
-        alone(matches!(point, PointQuestion::Series(_)))?;
+        alone(matches!(point, PointQuestion::Series(_)) && !options.statistics.csv)?;
         let wishes = SeriesWishes {
             place: Some(place),
             from: options.from,
@@ -85,10 +85,11 @@ async fn point(settings: &Settings, options: &StatsPoint) -> Result<()> {
     if let Some(file) = output.plot {
         plot::write(file, &plot::of_point(&answer)?)?;
     }
-    if options.json {
-        return progress::result(&serde_json::to_string_pretty(&answer)?);
+    match Form::of(options.statistics.csv, options.json) {
+        Form::Json => return progress::result(&serde_json::to_string_pretty(&answer)?),
+        Form::Csv => progress::result(&statistics::csv(&answer)?)?,
+        Form::Table => progress::result(&table(&answer).trim_fmt())?,
     }
-    progress::result(&table(&answer).trim_fmt())?;
     progress::say(&format!(
         "{}, mean of the cell around {}; cite {}",
         answer.cited.titled(),
@@ -161,6 +162,7 @@ async fn polygon(settings: &Settings, options: &StatsPolygon) -> Result<()> {
     let asked = wishes.over_region(manifest.product.clone(), region);
     let query = match (analysed, asked) {
         (Some(analysed), asked) => {
+            alone(!options.statistics.csv)?;
             let RegionQuestion::Series(query) = asked else {
                 return alone(false);
             };
@@ -181,10 +183,11 @@ async fn polygon(settings: &Settings, options: &StatsPolygon) -> Result<()> {
     if let Some(file) = output.plot {
         plot::write(file, &plot::of_region(&answer)?)?;
     }
-    if options.json {
-        return progress::result(&serde_json::to_string_pretty(&answer)?);
+    match Form::of(options.statistics.csv, options.json) {
+        Form::Json => return progress::result(&serde_json::to_string_pretty(&answer)?),
+        Form::Csv => progress::result(&statistics::csv(&answer)?)?,
+        Form::Table => progress::result(&region_table(&answer).trim_fmt())?,
     }
-    progress::result(&region_table(&answer).trim_fmt())?;
     progress::say(&format!(
         "{}, mean over {} ({:.3} 10⁶ km²), each cell by its area on the {} earth; cite {}",
         answer.cited.titled(),
