@@ -34,24 +34,22 @@ pub(crate) fn watched(
     store: &Store,
     before: impl Fn(&str) -> BoxFuture<'static, Result<()>> + Send + Sync + 'static,
 ) -> (Store, Arc<Mutex<Vec<String>>>) {
-    layered(store, Arc::new(before), TimeDelta::zero())
+    let before: Before = Arc::new(before);
+    layered(store, &before, TimeDelta::zero())
 }
 
 /// The same store with a clock that is ahead of this machine's, or behind it.
 pub(crate) fn ahead(store: &Store, ahead: TimeDelta) -> (Store, Arc<Mutex<Vec<String>>>) {
-    layered(
-        store,
-        Arc::new(|_key: &str| async { Ok(()) }.boxed()),
-        ahead,
-    )
+    let before: Before = Arc::new(|_key: &str| async { Ok(()) }.boxed());
+    layered(store, &before, ahead)
 }
 
-fn layered(store: &Store, before: Before, ahead: TimeDelta) -> (Store, Arc<Mutex<Vec<String>>>) {
+fn layered(store: &Store, before: &Before, ahead: TimeDelta) -> (Store, Arc<Mutex<Vec<String>>>) {
     let removed = Arc::<Mutex<Vec<String>>>::default();
     let layer = |inner| -> Arc<dyn ObjectStore> {
         Arc::new(Watched {
             inner,
-            before: Arc::clone(&before),
+            before: Arc::clone(before),
             removed: Arc::clone(&removed),
             ahead,
         })
