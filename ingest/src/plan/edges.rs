@@ -137,16 +137,17 @@ fn only(label: f64, [one, other]: [f64; 2], along: Along) -> Result<(f64, f64), 
             && width_deg.is_finite()
             && (label - middle).abs() <= (0.5 + TOLERANCE_CELLS) * width_deg
     };
-    // Longitudes as they are written, or else a turn further on.
-    let written = Some(cell(one, other)).filter(holds);
-    let turned = match along {
-        Along::Latitude => None,
+    let found = match along {
+        Along::Latitude => Some(cell(one, other)).filter(holds),
+        // Both within half a turn of the label; of a cell all round the earth these are one, and they are taken as they are written.
         Along::Longitude => {
             let near = |edge: f64| label + wrap_lon_deg(edge - label);
-            Some(cell(near(one), near(other))).filter(holds)
+            let near = Some(cell(near(one), near(other))).filter(holds);
+            let written = || Some(cell(one, other)).filter(|found| one < other && holds(found));
+            near.or_else(written)
         }
     };
-    written.or(turned).ok_or_else(|| {
+    found.ok_or_else(|| {
         format!("has a cell from {one} to {other} at the label {label}, which is not in it")
     })
 }
