@@ -55,7 +55,16 @@ struct Shape {
 
 /// Values, `[time, lat, lon]`, stored unit, NaN no data.
 pub(crate) fn values(description: &Description, steps: u64) -> Result<Definition, CubeError> {
-    let (grid, layout) = (&description.grid, Layout::of(&description.grid));
+    values_cut(description, steps, Layout::of(&description.grid))
+}
+
+/// The same in chunks and objects of a layout.
+pub(crate) fn values_cut(
+    description: &Description,
+    steps: u64,
+    layout: Layout,
+) -> Result<Definition, CubeError> {
+    let grid = &description.grid;
     let shape = Shape {
         name: cf::variable(description.quantity),
         cells: vec![steps, grid.rows.into(), grid.cols.into()],

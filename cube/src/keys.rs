@@ -12,6 +12,7 @@ use icechunk::store::StoreErrorKind;
 use serde_json::{Map, Value, json};
 use tokio::sync::RwLock;
 
+use crate::zarr_2::Group2;
 use crate::{At, CubeError, Description, Repository};
 
 /// Metadata of the group, or of an array in its folder.
@@ -27,6 +28,8 @@ pub struct Keys {
     snapshot: String,
     /// Of the group, with those of all arrays in it: who reads over HTTP can list nothing.
     consolidated: Bytes,
+    /// The same of version 2, or why there are none.
+    zarr_2: Result<Group2, String>,
     place: String,
 }
 
@@ -58,6 +61,7 @@ impl Repository {
             }
             let snapshot = own.snapshot_id().to_string();
             drop(own);
+            let zarr_2 = Group2::new(&group["attributes"], &arrays);
             group["consolidated_metadata"] =
                 json!({ "kind": "inline", "must_understand": false, "metadata": arrays });
             Ok(Keys {
@@ -66,6 +70,7 @@ impl Repository {
                 session,
                 snapshot,
                 consolidated: group.to_string().into(),
+                zarr_2,
                 place: self.place().to_owned(),
             })
         })
@@ -81,6 +86,19 @@ impl Keys {
     /// Names the state: the same name, the same values of all keys.
     pub fn snapshot(&self) -> &str {
         &self.snapshot
+    }
+
+    /// The same arrays by the keys of version 2.
+    pub(crate) fn zarr_2(&self) -> Result<&Group2, CubeError> {
+        let own = self.zarr_2.as_ref();
+        own.map_err(|e| {
+            CubeError::library(&self.place, "describing the arrays by Zarr version 2", e)
+        })
+    }
+
+    /// Where the cube is.
+    pub(crate) fn place(&self) -> &str {
+        &self.place
     }
 
     /// Length of the value of a key; none if there is no such key, or a chunk without data.

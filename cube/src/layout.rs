@@ -61,6 +61,14 @@ impl Layout {
         Self { chunk, object }
     }
 
+    /// The same chunks, each an object of its own.
+    pub(crate) fn without_shards(self) -> Self {
+        Self {
+            object: self.chunk,
+            ..self
+        }
+    }
+
     /// Rows and columns of an object of the time-major copy, cells: those of a chunk, in whole blocks.
     pub(crate) fn series_object(&self) -> [u32; 2] {
         self.chunk.map(|cells| cells.next_multiple_of(BLOCK_CELLS))

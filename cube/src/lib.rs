@@ -59,6 +59,8 @@ mod values;
 pub mod verify;
 pub mod weight_unit;
 mod windows;
+mod zarr_2;
+mod zarr_2_keys;
 
 pub use arrays::{Places, places};
 pub use at_hand::{AtHand, RunValues};
@@ -86,3 +88,4 @@ pub use stored_chunks::Undecoded;
 pub use sums::Basis;
 pub use values::{Block, EncodedBlocks, Piece, Values};
 pub use windows::CellAt;
+pub use zarr_2::ZarrVersion;

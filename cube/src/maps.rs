@@ -7,6 +7,7 @@ use contract::chunk::Window;
 use contract::grid::Grid;
 use futures::stream::{self, StreamExt as _, TryStreamExt as _};
 use zarrs::array::{Array, AsyncArrayShardedReadableExt as _, AsyncArrayShardedReadableExtCache};
+use zarrs::storage::byte_range::ByteRange;
 use zarrs_icechunk::AsyncIcechunkStore;
 
 use crate::arrays::Definition;
@@ -114,6 +115,12 @@ impl<T: Number> Maps<T> {
 
     async fn decoded(&self, index: [u64; 3]) -> Result<Option<Vec<T>>, String> {
         let found = if self.layout.is_sharded() {
+            let place = self.array.async_subchunk_byte_range(&self.shards, &index);
+            // The library gives what the index has, where a chunk that is not stored has no place but all bits set, and would read it there.
+            let place = place.await.map_err(|e| first_lines(&e))?;
+            if place.is_none_or(|place| matches!(place, ByteRange::FromStart(u64::MAX, _))) {
+                return Ok(None);
+            }
             let found = self
                 .array
                 .async_retrieve_encoded_subchunk(&self.shards, &index);

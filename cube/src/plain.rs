@@ -1,4 +1,5 @@
-//! A cube as plain Zarr v3 in a folder of a store: written once, with the metadata of all arrays in that of the group.
+//! A cube as plain Zarr in a folder of a store: written once, with the metadata of all arrays in that of the group. Version 2 is made of
+//! what the library writes of version 3 ([`crate::zarr_2`]).
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -17,11 +18,12 @@ use zarrs::storage::{
     AsyncWritableStorageTraits, OffsetBytesIterator, StorageError, StoreKey, StorePrefix,
 };
 
-use crate::arrays::{self, Fixed};
+use crate::arrays::{self, Definition, Fixed};
 use crate::bands::WholeField;
 use crate::field::{EncodedObject, Encoder, Number};
 use crate::group::{group, write_group};
-use crate::{Bands, CubeError, Description, Step, axis};
+use crate::zarr_2::{Array2, CHECKSUM_BYTES, CONSOLIDATED, Group2, key_of_2};
+use crate::{Bands, CubeError, Description, Layout, Step, ZarrVersion, axis};
 
 /// Objects of a field that are encoded and sent at a time.
 pub(crate) const OBJECTS_AT_ONCE: usize = 4;
@@ -75,7 +77,14 @@ where
     S: AsyncWritableStorageTraits + 'static,
 {
     let values = arrays::values(description, steps as u64)?;
-    let array = values.with_storage(Arc::clone(store));
+    write_definition(store, values).await
+}
+
+async fn write_definition<S>(store: &Arc<S>, definition: Definition) -> Result<(), CubeError>
+where
+    S: AsyncWritableStorageTraits + 'static,
+{
+    let array = definition.with_storage(Arc::clone(store));
     let stored = array.async_store_metadata().await;
     stored.map_err(|e| CubeError::library(&arrays::name(&array), "writing", e))
 }
@@ -84,6 +93,7 @@ where
 pub struct PlainZarr {
     folder: Arc<Folder>,
     description: Description,
+    layout: Layout,
     encoder: Arc<Encoder<f32>>,
     steps: Vec<Step>,
 }
@@ -97,6 +107,7 @@ impl PlainZarr {
         store: &'a Store,
         folder: &'a str,
         description: &'a Description,
+        version: ZarrVersion,
     ) -> BoxFuture<'a, Result<Self, CubeError>> {
         Box::pin(async move {
             if !store.list(folder).await?.is_empty() {
@@ -104,13 +115,21 @@ impl PlainZarr {
                     place: format!("{}{folder}", store.url()),
                 });
             }
+            let layout = Layout::of(&description.grid);
+            let layout = match version {
+                ZarrVersion::Two => layout.without_shards(),
+                ZarrVersion::Three => layout,
+            };
+            let values = arrays::values_cut(description, 1, layout)?;
             Ok(Self {
                 folder: Arc::new(Folder {
                     store: store.clone(),
                     name: folder.trim_matches('/').to_owned(),
+                    version,
                 }),
                 description: description.clone(),
-                encoder: Arc::new(Encoder::new(description)?),
+                layout,
+                encoder: Arc::new(Encoder::of(values, &description.grid, layout)),
                 steps: vec![],
             })
         })
@@ -153,7 +172,7 @@ impl PlainZarr {
             }
             let grid = self.description.grid;
             let at = self.steps.len() as u64;
-            let values_array = arrays::values(&self.description, at + 1)?;
+            let values_array = arrays::values_cut(&self.description, at + 1, self.layout)?;
             let mut digest = FieldDigest::new(&grid, period);
             for (row, rows) in self.encoder.bands().enumerate() {
                 let count = rows.len() * grid.cols as usize;
@@ -196,15 +215,28 @@ impl PlainZarr {
             metadata: std::sync::Mutex::default(),
         });
         write_frame_of_reference(&held, description).await?;
-        write_length(&held, description, self.steps.len()).await?;
+        let values = arrays::values_cut(description, self.steps.len() as u64, self.layout)?;
+        write_definition(&held, values).await?;
         axis::write(&held, description, &self.steps, 0).await?;
         let arrays = held.take();
+        let group = group(folder, "", description.attributes())?;
+        let described = |e: String| CubeError::library("the group", "describing it", e);
+        let mut metadata =
+            serde_json::to_value(group.metadata()).map_err(|e| described(e.to_string()))?;
+        if folder.version == ZarrVersion::Two {
+            let group = Group2::new(&metadata["attributes"], &arrays).map_err(described)?;
+            // Whoever finds the metadata of all finds all.
+            let others = group.metadata().filter(|(key, _)| *key != CONSOLIDATED);
+            let last = group.metadata().filter(|(key, _)| *key == CONSOLIDATED);
+            for (key, content) in others.chain(last) {
+                let set = folder.set_named(key, content.clone()).await;
+                set.map_err(|e| CubeError::library(key, "writing", e))?;
+            }
+            return Ok(());
+        }
         for (name, metadata) in &arrays {
             folder.set_metadata(name, metadata).await?;
         }
-        let mut metadata =
-            serde_json::to_value(group(folder, "", description.attributes())?.metadata())
-                .map_err(|e| CubeError::library("the group", "describing it", e))?;
         metadata["consolidated_metadata"] =
             json!({ "kind": "inline", "must_understand": false, "metadata": arrays });
         folder.set_metadata("", &metadata).await
@@ -245,6 +277,7 @@ pub(crate) fn encoded<T: Number>(
 struct Folder {
     store: Store,
     name: String,
+    version: ZarrVersion,
 }
 
 impl Folder {
@@ -276,7 +309,14 @@ impl Folder {
 #[async_trait]
 impl AsyncWritableStorageTraits for Folder {
     async fn set(&self, key: &StoreKey, value: Bytes) -> Result<(), StorageError> {
-        let set = self.set_named(key.as_str(), value).await;
+        let set = match self.version {
+            ZarrVersion::Two => {
+                let end = value.len().saturating_sub(CHECKSUM_BYTES);
+                self.set_named(&key_of_2(key.as_str()), value.slice(..end))
+                    .await
+            }
+            ZarrVersion::Three => self.set_named(key.as_str(), value).await,
+        };
         set.map_err(StorageError::Other)
     }
 
@@ -317,6 +357,21 @@ impl Held {
         let metadata = self.metadata.lock();
         std::mem::take(&mut *metadata.unwrap_or_else(std::sync::PoisonError::into_inner))
     }
+
+    /// What version 2 needs in the place of a chunk that version 3 leaves out.
+    fn blank(&self, key: &str) -> Result<Option<Bytes>, String> {
+        let name = key
+            .strip_suffix("/c")
+            .or(key.split_once("/c/").map(|(name, _)| name));
+        let metadata = self.metadata.lock();
+        let metadata = metadata.unwrap_or_else(std::sync::PoisonError::into_inner);
+        match name.and_then(|name| Some((name, metadata.get(name)?))) {
+            Some((name, own)) if self.folder.version == ZarrVersion::Two => {
+                Array2::of(name, own)?.blank()
+            }
+            _ => Ok(None),
+        }
+    }
 }
 
 #[async_trait]
@@ -344,7 +399,13 @@ impl AsyncWritableStorageTraits for Held {
     }
 
     async fn erase(&self, key: &StoreKey) -> Result<(), StorageError> {
-        self.folder.erase(key).await
+        match self.blank(key.as_str()).map_err(StorageError::Other)? {
+            Some(blank) => {
+                let set = self.folder.set_named(&key_of_2(key.as_str()), blank).await;
+                set.map_err(StorageError::Other)
+            }
+            None => self.folder.erase(key).await,
+        }
     }
 
     async fn erase_prefix(&self, prefix: &StorePrefix) -> Result<(), StorageError> {

@@ -63,6 +63,42 @@ fn xarray_finds_the_values_times_and_places_of_the_source_files() {
     assert!(error.to_lowercase().contains("checksum"), "{error}");
 }
 
+/// Programs that do not read version 3, GDAL among them, find the same in version 2: in files and at the server's addresses.
+#[test]
+fn xarray_and_gdal_find_the_same_in_version_2() {
+    let folder = tempfile::tempdir().unwrap();
+    let cube = folder.path().join("flux.zarr");
+    let path = cube.to_str().unwrap();
+    let words = ["export", "takahashi09-flux", "--to", "zarr2", path];
+    program::succeed(demo_data(), &words).unwrap();
+    let server = Server::start(demo_data(), &["serve"]).unwrap();
+    let address = format!("{}/zarr2/takahashi09-flux@1", server.url);
+    for place in [
+        path,
+        &address,
+        &format!("gdal:{path}"),
+        &format!("gdal:{address}"),
+    ] {
+        let found = compared(place).unwrap();
+        assert_eq!(found["steps"], 12, "{place}");
+        assert!(
+            found["values"].as_u64().unwrap() > 400_000,
+            "{place}: {found}"
+        );
+    }
+    // The comparison by GDAL sees one step in the place of another.
+    std::fs::copy(
+        cube.join("carbon_flux/3.0.0"),
+        cube.join("carbon_flux/4.0.0"),
+    )
+    .unwrap();
+    let error = compared(format!("gdal:{path}")).unwrap_err();
+    assert!(
+        error.contains("other values") || error.contains("other cells"),
+        "{error}"
+    );
+}
+
 #[test]
 fn xarray_finds_the_same_over_http() {
     let server = Server::start(demo_data(), &["serve"]).unwrap();

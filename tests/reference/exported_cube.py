@@ -2,7 +2,8 @@
 """Opens an exported product with xarray and compares it with the files that it was landed from, exactly.
 
     exported_cube.py CUBE FOLDER    CUBE is plain Zarr, an address of it (http://...), or a folder with an Icechunk repository
-                                    where the package `icechunk` is there to read it; FOLDER holds the twelve files of Takahashi et al. (2009) that
+                                    where the package `icechunk` is there to read it; behind `gdal:` a folder or an address that
+                                    GDAL reads; FOLDER holds the twelve files of Takahashi et al. (2009) that
                                     come with the FluxEngine package
 
 Shares nothing with Fluxglobe: what a cell, a month and a unit are is said here once more, as the files' README has it.
@@ -82,7 +83,7 @@ def over_http(address):
 def opened(cube):
     if cube.startswith("http://"):
         return xr.open_zarr(over_http(cube), consolidated=True)
-    if (Path(cube) / "zarr.json").exists():
+    if any((Path(cube) / name).exists() for name in ("zarr.json", ".zgroup")):
         # What the group's metadata say of all arrays is all that is read.
         return xr.open_zarr(cube, consolidated=True)
     import icechunk
@@ -106,7 +107,48 @@ def source(file):
     return grams[np.ix_(rows, cols)], north[rows], np.sort((west + 180) % 360 - 180)
 
 
+def flux_of(file, month):
+    """A file's flux as it is landed, kg m-2 s-1, the ends of its month, and the northern and western edges of its cells."""
+    start = np.datetime64(f"2000-{month:02}-01", "ms")
+    end = np.datetime64(f"2000-{month + 1:02}-01" if month < 12 else "2001-01-01", "ms")
+    grams, north, west = source(file)
+    seconds = (end - start) / np.timedelta64(1, "s")
+    return (grams * (KG_PER_G / seconds)).astype(np.float32), (start, end), (north, west)
+
+
+def same(found, expected, file):
+    """Compares values, no data among them; how many were compared."""
+    assert found.dtype == np.float32
+    assert np.array_equal(np.isnan(found), np.isnan(expected)), f"{file}: other cells have data"
+    valid = ~np.isnan(expected)
+    off = np.flatnonzero(found[valid].view(np.int32) != expected[valid].view(np.int32))
+    assert off.size == 0, f"{file}: {off.size} other values"
+    return int(valid.sum())
+
+
+def gdal(place, folder):
+    """The same by GDAL: a band a month, and where its cells lie."""
+    import rasterio
+
+    prefix = "/vsicurl/" if place.startswith("http://") else ""
+    files = sorted(Path(folder).glob("*.nc"))
+    compared = 0
+    with rasterio.open(f'ZARR:"{prefix}{place}":/carbon_flux') as data:
+        assert len(files) == 12 and data.count == 12 and data.dtypes[0] == "float32", (len(files), data.count, data.dtypes)
+        assert data.crs == rasterio.crs.CRS.from_epsg(4326), data.crs
+        for month, file in enumerate(files, start=1):
+            expected, (start, end), (north, west) = flux_of(file, month)
+            assert data.transform.almost_equals(rasterio.transform.Affine(1, 0, west[0], 0, -1, north[0])), data.transform
+            middle = start + (end - start) / 2
+            told = data.tags(month)["DIM_time_VALUE"]
+            assert int(told) == middle.astype("datetime64[ms]").astype(np.int64), (told, middle)
+            compared += same(data.read(month), expected, file)
+    print(json.dumps({"steps": len(files), "values": compared}))
+
+
 def main(cube, folder):
+    if cube.startswith("gdal:"):
+        return gdal(cube.removeprefix("gdal:"), folder)
     data = opened(cube)
     flux = data["carbon_flux"]
     files = sorted(Path(folder).glob("*.nc"))
@@ -117,22 +159,12 @@ def main(cube, folder):
     assert data["crs"].attrs["grid_mapping_name"] == "latitude_longitude"
     compared = 0
     for month, file in enumerate(files, start=1):
-        start = np.datetime64(f"2000-{month:02}-01", "ms")
-        end = np.datetime64(f"2000-{month + 1:02}-01" if month < 12 else "2001-01-01", "ms")
+        expected, (start, end), (north, west) = flux_of(file, month)
         step = data.isel(time=month - 1)
         bounds = step["time_bnds"].values
         assert bounds[0] == start and bounds[1] == end, (file, bounds)
         assert step["time"].values == start + (end - start) / 2, (file, step["time"].values)
-        grams, north, west = source(file)
-        seconds = (end - start) / np.timedelta64(1, "s")
-        expected = (grams * (KG_PER_G / seconds)).astype(np.float32)
-        found = step["carbon_flux"].values
-        assert found.dtype == np.float32
-        assert np.array_equal(np.isnan(found), np.isnan(expected)), f"{file}: other cells have data"
-        valid = ~np.isnan(expected)
-        off = np.flatnonzero(found[valid].view(np.int32) != expected[valid].view(np.int32))
-        assert off.size == 0, f"{file}: {off.size} other values"
-        compared += int(valid.sum())
+        compared += same(step["carbon_flux"].values, expected, file)
     assert np.array_equal(data["lat"].values, north - 0.5), data["lat"].values
     assert np.array_equal(data["lon"].values, west + 0.5), data["lon"].values
     assert np.array_equal(data["lat_bnds"].values, np.stack([north, north - 1], axis=1))

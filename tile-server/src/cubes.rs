@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use bytes::Bytes;
 use contract::product::ProductId;
-use cube::{At, CubeError, Keys, Repository};
+use cube::{At, CubeError, Keys, Repository, ZarrVersion};
 use prometheus::IntGauge;
 use quick_cache::sync::Cache;
 use storage::Store;
@@ -115,7 +115,7 @@ impl Cubes {
     pub(crate) async fn get(
         &self,
         keys: &Keys,
-        key: &str,
+        (zarr, key): (ZarrVersion, &str),
         (range, bytes): (Option<Range<u64>>, u64),
         turn: Turn,
     ) -> Result<Option<Bytes>, ServerError> {
@@ -129,7 +129,15 @@ impl Cubes {
                 (self.held.wait(client, bytes).await?, None)
             }
         };
-        let content = self.answered(keys, keys.get(key, range).await)?;
+        let read = match zarr {
+            ZarrVersion::Three => keys.get(key, range).await,
+            // Read whole, for it is compared with its checksum.
+            ZarrVersion::Two => {
+                let whole = keys.get_2(key).await;
+                whole.map(|whole| whole.map(|whole| part(&whole, range.as_ref())))
+            }
+        };
+        let content = self.answered(keys, read)?;
         // The room goes with the bytes, not with the body: that one ends when they lie in the connection's queue.
         Ok(content.map(|content| {
             Bytes::from_owner(Held {
@@ -140,8 +148,16 @@ impl Cubes {
     }
 
     /// Its length.
-    pub(crate) async fn length(&self, keys: &Keys, key: &str) -> Result<Option<u64>, ServerError> {
-        self.answered(keys, keys.length(key).await)
+    pub(crate) async fn length(
+        &self,
+        keys: &Keys,
+        (zarr, key): (ZarrVersion, &str),
+    ) -> Result<Option<u64>, ServerError> {
+        let length = match zarr {
+            ZarrVersion::Three => keys.length(key).await,
+            ZarrVersion::Two => keys.length_2(key).await,
+        };
+        self.answered(keys, length)
     }
 
     fn answered<T>(&self, keys: &Keys, answer: Result<T, CubeError>) -> Result<T, ServerError> {
@@ -153,6 +169,13 @@ impl Cubes {
             failed(error)
         })
     }
+}
+
+/// Those bytes of a value that are asked for.
+fn part(whole: &Bytes, range: Option<&Range<u64>>) -> Bytes {
+    let end = whole.len() as u64;
+    let range = range.map_or(0..end, |range| range.start.min(end)..range.end.min(end));
+    whole.slice(range.start as usize..range.end.max(range.start) as usize)
 }
 
 /// What a cube's failure means for who asked.
@@ -233,7 +256,7 @@ mod tests {
         } = cubes.reads.enter().await.unwrap();
         let before = cubes.reads.enter().now_or_never();
         assert!(before.is_none(), "there is another turn: it tests nothing");
-        let mut waiting = Box::pin(cubes.get(&keys, KEY, (None, 100), turn));
+        let mut waiting = Box::pin(cubes.get(&keys, (ZarrVersion::Three, KEY), (None, 100), turn));
         assert!(waiting.as_mut().now_or_never().is_none());
         let next = cubes.reads.enter().now_or_never();
         assert!(next.is_some_and(|next| next.is_ok()), "the turn is held");
@@ -252,7 +275,7 @@ mod tests {
         let cubes = narrow(store);
         let full = cubes.held.enter(Client::asking(), 200).unwrap();
         let Pass { place, turn } = cubes.reads.enter().await.unwrap();
-        let mut leaving = Box::pin(cubes.get(&keys, KEY, (None, 100), turn));
+        let mut leaving = Box::pin(cubes.get(&keys, (ZarrVersion::Three, KEY), (None, 100), turn));
         assert!(leaving.as_mut().now_or_never().is_none());
         drop((leaving, place));
         assert_eq!(cubes.held.held_bytes(), 200);
@@ -264,7 +287,10 @@ mod tests {
             turn,
         } = next.expect("the turn is free").unwrap();
         // All of a client's room is there for the next one.
-        let content = cubes.get(&keys, KEY, (None, 200), turn).await.unwrap();
+        let content = cubes
+            .get(&keys, (ZarrVersion::Three, KEY), (None, 200), turn)
+            .await
+            .unwrap();
         assert!(content.is_some());
         assert_eq!(cubes.held.held_bytes(), 200);
     }

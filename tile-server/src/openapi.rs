@@ -65,6 +65,7 @@ const RETRY_AFTER: &str = "Seconds after which the same request may succeed";
         budget::post_history,
         check::get,
         zarr::get,
+        zarr::get_2,
         platforms::get,
         observations::get,
         health::live,

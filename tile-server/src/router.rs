@@ -135,6 +135,7 @@ pub fn router(state: AppState) -> Router {
             get(observations::get),
         )
         .route("/zarr/{product}/{*key}", get(zarr::get))
+        .route("/zarr2/{product}/{*key}", get(zarr::get_2))
         .route("/healthz", get(health::live))
         .route("/readyz", get(health::ready))
         .route("/metrics", get(metrics::get))

@@ -14,5 +14,7 @@ mod product;
 mod rivals;
 mod round_trip;
 mod series;
+mod shard_gaps;
 mod watched;
 mod windows;
+mod zarr_2;

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use contract::quantity::Quantity;
-use cube::{CubeError, PlainZarr};
+use cube::{CubeError, PlainZarr, ZarrVersion};
 use serde_json::Value;
 use storage::Store;
 
@@ -19,7 +19,9 @@ async fn it_can_be_opened_when_it_is_finished_and_one_document_describes_all() {
     let folder = tempfile::tempdir().unwrap();
     let store = Store::open(folder.path().to_str().unwrap()).unwrap();
     let description = description(Quantity::AccumulatedCarbon, grid(700, 1500));
-    let mut zarr = PlainZarr::create(&store, "", &description).await.unwrap();
+    let mut zarr = PlainZarr::create(&store, "", &description, ZarrVersion::Three)
+        .await
+        .unwrap();
     for number in [1, 3] {
         let put = zarr.append(month(number), values(&description.grid, number));
         put.await.unwrap();

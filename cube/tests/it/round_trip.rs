@@ -196,7 +196,8 @@ async fn a_place_that_is_not_empty_or_not_there_is_refused() {
         let again = Repository::create(&store, "p", &description).await;
         let again = again.map(|_it| ()).unwrap_err();
         assert!(matches!(again, CubeError::Exists { .. }), "{again}");
-        let plain = cube::PlainZarr::create(&store, "p", &description).await;
+        let plain =
+            cube::PlainZarr::create(&store, "p", &description, cube::ZarrVersion::Three).await;
         assert!(matches!(plain.map(|_it| ()), Err(CubeError::Exists { .. })));
     }
 }

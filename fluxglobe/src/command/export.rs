@@ -7,7 +7,7 @@ use contract::chunk::BAND_CELLS;
 use contract::kind::Vouched;
 use contract::manifest::{Manifest, Step};
 use contract::time::Period;
-use cube::{At, Cube, Description, FieldBands, Follower, PlainZarr, Repository};
+use cube::{At, Cube, Description, FieldBands, Follower, PlainZarr, Repository, ZarrVersion};
 use export::Format;
 use indicatif::ProgressBar;
 use serde::Serialize;
@@ -66,7 +66,7 @@ pub(crate) async fn run(settings: &Settings, options: &Export) -> Result<()> {
 /// Formats that are files on this machine.
 fn file_format(to: ExportFormat) -> Option<Format> {
     match to {
-        ExportFormat::Zarr | ExportFormat::Icechunk => None,
+        ExportFormat::Zarr | ExportFormat::Zarr2 | ExportFormat::Icechunk => None,
         ExportFormat::Netcdf => Some(Format::NetCdf),
         ExportFormat::Geotiff => Some(Format::GeoTiff),
         ExportFormat::Parquet => Some(Format::Parquet),
@@ -183,9 +183,14 @@ async fn arrays(
     destination: &Store,
 ) -> Result<Option<String>> {
     let (store, manifest, bar) = (source.store, source.manifest, source.bar);
-    if to == ExportFormat::Zarr {
+    let zarr = match to {
+        ExportFormat::Zarr => Some(ZarrVersion::Three),
+        ExportFormat::Zarr2 => Some(ZarrVersion::Two),
+        _ => None,
+    };
+    if let Some(version) = zarr {
         let description = Description::of(store, manifest).await?;
-        let mut zarr = PlainZarr::create(destination, "", &description).await?;
+        let mut zarr = PlainZarr::create(destination, "", &description, version).await?;
         let cube = own_cube(store, manifest).await;
         for (place, step) in manifest.steps.iter().enumerate() {
             bar.set_message(instants::shown(step.period.start));

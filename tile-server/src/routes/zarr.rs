@@ -1,5 +1,6 @@
 //! `/zarr/{product}/{key}`: a product as Zarr version 3, for xarray and whoever else reads it over HTTP. Chunks are sent as
-//! they are stored: who asked decodes them and compares their checksums.
+//! they are stored: who asked decodes them and compares their checksums. `/zarr2/{product}/{key}`: the same as version 2, for GDAL; its
+//! chunks have no checksums, so that they are compared here.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -8,7 +9,7 @@ use axum::body::Body;
 use axum::extract::State;
 use axum::http::{HeaderMap, Method, StatusCode, header};
 use axum::response::{IntoResponse as _, Response};
-use cube::Keys;
+use cube::{Keys, ZarrVersion};
 
 use crate::error::ServerError;
 use crate::extract::UrlPath;
@@ -43,7 +44,53 @@ pub(crate) async fn get(
     UrlPath((product, key)): UrlPath<(String, String)>,
     asked: HeaderMap,
 ) -> Result<Response, ServerError> {
-    let (keys, is_pinned) = Box::pin(opened(&state, &product)).await?;
+    answer(
+        &state,
+        (&product, ZarrVersion::Three, &key),
+        (&method, &asked),
+    )
+    .await
+}
+
+/// The same arrays by keys of Zarr version 2, for programs that read no other, such as GDAL and QGIS: `.zmetadata` describes all
+/// arrays. Coarser levels are left out.
+#[utoipa::path(
+    get,
+    path = "/zarr2/{product}/{key}",
+    operation_id = "zarr2",
+    tag = "statistics",
+    params(
+        ("product" = String, Path, description = "Product, or a version of it, `PRODUCT@NUMBER`"),
+        ("key" = String, Path, description = "Key of Zarr version 2, such as `.zmetadata` or `time/0`"),
+    ),
+    responses(
+        (status = 200, description = "The value of the key", content(("application/octet-stream"))),
+        (status = 206, description = "The bytes of it that `Range` asked for; with another tag in `If-Range` all of it is sent", content(("application/octet-stream"))),
+        (status = 304, description = "The copy that the client has is right"),
+        (status = 404, description = "No such product, version or key, or a chunk without data", body = crate::error::Refusal),
+        (status = 416, description = "It has no such bytes", body = crate::error::Refusal),
+    ),
+)]
+pub(crate) async fn get_2(
+    State(state): State<AppState>,
+    method: Method,
+    UrlPath((product, key)): UrlPath<(String, String)>,
+    asked: HeaderMap,
+) -> Result<Response, ServerError> {
+    answer(
+        &state,
+        (&product, ZarrVersion::Two, &key),
+        (&method, &asked),
+    )
+    .await
+}
+
+async fn answer(
+    state: &AppState,
+    (product, zarr, key): (&str, ZarrVersion, &str),
+    (method, asked): (&Method, &HeaderMap),
+) -> Result<Response, ServerError> {
+    let (keys, is_pinned) = Box::pin(opened(state, product)).await?;
     let tag = format!("\"{}\"", keys.snapshot());
     let cache_control = if is_pinned {
         CACHE_CONTROL_PINNED
@@ -59,19 +106,21 @@ pub(crate) async fn get(
         place: _place,
         turn,
     } = state.cubes.reads.enter().await?;
-    let length = state.cubes.length(&keys, &key).await?;
+    let length = state.cubes.length(&keys, (zarr, key)).await?;
     let length = length.ok_or(ServerError::UnknownAddress)?;
-    if has_tag(&asked, &tag) {
+    if has_tag(asked, &tag) {
         return Ok((StatusCode::NOT_MODIFIED, headers).into_response());
     }
     // To HEAD a range means nothing (RFC 9110, 14.2): it asks for what GET says of all.
-    let range = if method == Method::GET && is_of_same(&asked, &tag) {
-        part(&asked, length)?
+    let range = if *method == Method::GET && is_of_same(asked, &tag) {
+        part(asked, length)?
     } else {
         None
     };
     let bytes = range.as_ref().map_or(length, |part| part.end - part.start);
-    let read = state.cubes.get(&keys, &key, (range.clone(), bytes), turn);
+    let read = state
+        .cubes
+        .get(&keys, (zarr, key), (range.clone(), bytes), turn);
     let content = read.await.inspect_err(|error| {
         if matches!(error, ServerError::Busy) {
             state.metrics.refused.inc();

@@ -21,7 +21,7 @@ const COMMITTED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/openapi.json");
 const ROUTER: &str = include_str!("../../src/router.rs");
 
 /// One address of every operation, and what is sent along.
-const ASKED: [(&str, &str); 27] = [
+const ASKED: [(&str, &str); 28] = [
     (
         "/tiles/{product}/{mode}/{z}/{x}/{y}.png",
         "/tiles/flux/volume/1/0/1@2x.png",
@@ -91,6 +91,7 @@ const ASKED: [(&str, &str); 27] = [
         "/api/observations/buoys/51001",
     ),
     ("/zarr/{product}/{key}", "/zarr/flux/zarr.json"),
+    ("/zarr2/{product}/{key}", "/zarr2/flux/.zmetadata"),
     ("/healthz", "/healthz"),
     ("/readyz", "/readyz"),
     ("/metrics", "/metrics"),

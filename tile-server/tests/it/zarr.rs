@@ -156,6 +156,45 @@ async fn parts_are_those_of_the_whole_and_copies_are_known_again() {
 }
 
 #[tokio::test]
+async fn version_2_has_the_same_chunks_without_their_checksums_and_whole_metadata() {
+    let app = TestApp::new().await;
+    let answer = app.get("/zarr2/flux/.zmetadata").await;
+    assert_eq!(answer.status, StatusCode::OK, "{}", answer.text());
+    let all = answer.json()["metadata"].clone();
+    for key in [".zgroup", ".zattrs", "carbon_flux/.zarray", "time/.zattrs"] {
+        let own = app.get(&format!("/zarr2/flux/{key}")).await;
+        assert_eq!(own.json(), all[key], "{key}");
+    }
+    for (of_2, of_3) in [
+        ("carbon_flux/0.0.0", "carbon_flux/c/0/0/0"),
+        ("time/0", "time/c/0"),
+    ] {
+        let path = format!("/zarr2/flux@1/{of_2}");
+        let whole = app.get(&path).await;
+        let stored = app.get(&format!("/zarr/flux@1/{of_3}")).await;
+        assert_eq!(whole.body, stored.body[..stored.body.len() - 4], "{of_2}");
+        assert_eq!(whole.headers[header::ETAG], stored.headers[header::ETAG]);
+        let part = app.get_with(&path, &[("range", "bytes=3-9")]).await;
+        assert_eq!(part.status, StatusCode::PARTIAL_CONTENT);
+        assert_eq!(part.body, whole.body[3..10]);
+        let beyond = format!("bytes={}-", whole.body.len());
+        let beyond = app.get_with(&path, &[("range", &beyond)]).await;
+        assert_eq!(beyond.status, StatusCode::RANGE_NOT_SATISFIABLE);
+    }
+    for none in [
+        "flux/zarr.json",
+        "flux/carbon_flux/c/0/0/0",
+        "flux/carbon_flux/9.0.0",
+        "flux/../repo",
+        "flux@9/.zgroup",
+        "no/.zgroup",
+    ] {
+        let answer = app.get(&format!("/zarr2/{none}")).await;
+        assert_eq!(answer.status, StatusCode::NOT_FOUND, "{none}");
+    }
+}
+
+#[tokio::test]
 async fn what_nobody_takes_counts_as_held_until_it_is_gone() {
     let app = TestApp::new().await;
     let path = "/zarr/flux@1/carbon_flux/c/0/0/0";
