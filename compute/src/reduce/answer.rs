@@ -27,6 +27,7 @@ use super::scales::{Extremes, between, small_bins};
 use super::tasks::Version;
 use super::weighed::Weighed;
 use crate::budget::rows::coverage_percent;
+use crate::complete_sums::told_of_sums;
 use crate::summed::{check_averaged, check_averaged_in_a_cell, holds_codes};
 use crate::{ComputeError, Engine, catalogue};
 
@@ -73,7 +74,11 @@ pub fn statistics_of<'a>(
         let (window, inside) = manifest.steps_inside(query.from, query.to)?;
         let periods: Vec<Period> = manifest.steps.iter().map(|step| step.period).collect();
         let bins = query.step.bins(window, periods.iter().copied())?;
-        let weighed = Weighed::of(engine, manifest, query).await?;
+        let mut weighed = Weighed::of(engine, manifest, query).await?;
+        if let Some(last) = inside.last() {
+            let told = told_of_sums(engine, manifest, &weighed.whole, last).await?;
+            weighed.notes.extend(told);
+        }
         let inside = (window, inside.len());
         let asked = Reduction::of(engine, (manifest, &id), &weighed, inside).await?;
         let (bins, scales) = asked.summed(&periods, &bins, wanted(query)).await?;
