@@ -11,6 +11,7 @@ pub mod budget;
 pub mod catalogue;
 pub mod check;
 pub mod cluster;
+mod complete_sums;
 pub mod computed;
 pub mod dependents;
 mod depth;

@@ -9,6 +9,7 @@ mod analysis;
 mod axes;
 mod batches;
 mod budget;
+mod checked;
 mod columns;
 mod compared;
 mod copies;

@@ -10,6 +10,8 @@ const SQUARE_BITS: i32 = 48;
 /// Least standard deviation in units of the scale that sums of squares tell, as a power of two. Each square is rounded by half a step or less, 2⁻⁴⁹: of a
 /// variance of 2⁻⁴⁰ that is a five-hundredth.
 const LEAST_STD_BITS: i32 = 20;
+/// Least mean distance from a zero at 0 that sums of values tell, in steps, as a power of two. Each value is rounded by half a step or less: half a millionth.
+const LEAST_MEAN_BITS: i32 = 20;
 /// Largest value in units of the scale: twice what can be true.
 const LIMIT: f64 = 2.0;
 /// Added to a number below 2⁵¹, it leaves the nearest integer in the lowest bits (halves to even).
@@ -76,6 +78,11 @@ impl Scale {
         f64::from(self.exponent).exp2()
     }
 
+    /// The largest distance from the zero that it was made for, stored unit.
+    pub fn largest(self) -> f64 {
+        self.unit()
+    }
+
     /// Value that is summed as 0, stored unit.
     pub fn zero(self) -> f64 {
         self.zero
@@ -128,6 +135,12 @@ impl Scale {
     /// The mean of some values, stored unit: their weighted sum in steps over their weight.
     pub fn mean(self, sum: i128, weight: i128) -> f64 {
         self.zero + self.deviation(sum, weight)
+    }
+
+    /// Do their sum and weight tell this mean, to half a millionth? Of smaller values it is in part what rounding made of them.
+    pub fn tells_mean(self, sum: i128, weight: i128) -> bool {
+        let steps = (sum as f64 / weight as f64).abs();
+        self.zero.abs() > 0.0 || steps >= f64::from(LEAST_MEAN_BITS).exp2()
     }
 
     /// The mean distance from the zero, stored unit.
@@ -271,5 +284,16 @@ mod tests {
         assert!(scale.tells_std(std));
         let (_mean, std) = of(&[271.25; 7]);
         assert!(std < 1e-4 && !scale.tells_std(std), "{std}");
+    }
+
+    #[test]
+    fn means_of_few_steps_are_not_told_unless_their_zero_is_elsewhere() {
+        let scale = Scale::of(Quantity::AccumulatedCarbon).unwrap();
+        for (mean, is_told) in [(1.0, true), (-1e-3, true), (1e-6, false), (0.0, false)] {
+            let sum = i128::from(nearest(mean * scale.steps_per_value())) * 7;
+            assert_eq!(scale.tells_mean(sum, 7), is_told, "{mean}");
+        }
+        let kelvins = Scale::of(Quantity::SeaSurfaceTemperature).unwrap();
+        assert!(kelvins.tells_mean(0, 7));
     }
 }

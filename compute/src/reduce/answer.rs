@@ -1,5 +1,6 @@
 //! Statistics of a version over a geometry: what is asked put together, passes over the values, rows.
 
+mod small_means;
 mod small_stds;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -27,6 +28,7 @@ use super::scales::{Extremes, between, small_bins};
 use super::tasks::Version;
 use super::weighed::Weighed;
 use crate::budget::rows::coverage_percent;
+use crate::complete_sums::told_of_sums;
 use crate::summed::{check_averaged, check_averaged_in_a_cell, holds_codes};
 use crate::{ComputeError, Engine, catalogue};
 
@@ -73,7 +75,11 @@ pub fn statistics_of<'a>(
         let (window, inside) = manifest.steps_inside(query.from, query.to)?;
         let periods: Vec<Period> = manifest.steps.iter().map(|step| step.period).collect();
         let bins = query.step.bins(window, periods.iter().copied())?;
-        let weighed = Weighed::of(engine, manifest, query).await?;
+        let mut weighed = Weighed::of(engine, manifest, query).await?;
+        if let Some(last) = inside.last() {
+            let told = told_of_sums(engine, manifest, &weighed.whole, last).await?;
+            weighed.notes.extend(told);
+        }
         let inside = (window, inside.len());
         let asked = Reduction::of(engine, (manifest, &id), &weighed, inside).await?;
         let (bins, scales) = asked.summed(&periods, &bins, wanted(query)).await?;
@@ -219,13 +225,19 @@ impl<'a> Reduction<'a> {
         let found = self.accumulated(wanted.clone()).await?;
         let mut sums = bin_sums(periods, bins, &found).ok_or_else(too_large)?;
         let mut scales = vec![self.scale; bins.len()];
-        if self.extremes.is_empty() {
+        let accumulates = self.manifest.quantity == Quantity::AccumulatedCarbon;
+        if self.extremes.is_empty() && !accumulates {
             return Ok((sums, scales));
         }
         let steps_of = bins.iter().map(|bin| times(periods, *bin).1);
         let steps_of = steps_of.map(|times| times.into_iter().map(|(step, _)| step).collect());
         let steps_of: Vec<Vec<u32>> = steps_of.collect();
-        for small in small_bins(&self.extremes, &steps_of) {
+        let small = if accumulates {
+            self.small_means(&sums, &steps_of).await?
+        } else {
+            small_bins(&self.extremes, &steps_of)
+        };
+        for small in small {
             let periods_of: Vec<Period> = small.bins.iter().map(|bin| bins[*bin]).collect();
             let asked = (small.scale, wanted.clone());
             let own = self.summed_again(asked, &small.steps, (periods, &periods_of));
@@ -327,10 +339,7 @@ impl<'a> Reduction<'a> {
             with_squares: false,
             with_extremes: true,
         };
-        let found = self.accumulated(wanted).await?;
-        let own = found.steps.iter();
-        let own = own.map(|(step, sums)| (*step, (sums.min, sums.max)));
-        Ok(own.filter(|(_, (min, max))| min <= max).collect())
+        Ok(extremes_of(&self.accumulated(wanted).await?))
     }
 
     /// The percentiles of every bin that are asked for, stored unit.
@@ -350,6 +359,13 @@ impl<'a> Reduction<'a> {
         }
         Ok(searches.values())
     }
+}
+
+/// Where the values of steps lie that hold any.
+fn extremes_of(found: &Accumulated) -> Extremes {
+    let own = found.steps.iter();
+    let own = own.map(|(step, sums)| (*step, (sums.min, sums.max)));
+    own.filter(|(_, (min, max))| min <= max).collect()
 }
 
 /// What rows are made with.

@@ -29,22 +29,25 @@ type Held = (usize, (f32, f32));
 /// Bins that the scale of all values would say little or nothing of, those of like size together; `steps_of` are the steps of each bin.
 /// Zeros are what they are in any scale.
 pub(super) fn small_bins(extremes: &Extremes, steps_of: &[Vec<u32>]) -> Vec<SmallBins> {
-    let Some(all) = between(extremes.values().copied()) else {
-        return vec![];
-    };
+    let all = between(extremes.values().copied());
+    all.map_or_else(Vec::new, |all| bins_below(size(all), extremes, steps_of))
+}
+
+/// The same of bins in a scale of values up to `told`.
+pub(super) fn bins_below(told: f64, extremes: &Extremes, steps_of: &[Vec<u32>]) -> Vec<SmallBins> {
     let own =
         |steps: &Vec<u32>| between(steps.iter().filter_map(|step| extremes.get(step).copied()));
     let held = steps_of.iter().map(own).enumerate();
     let held = held.filter_map(|(bin, own)| own.map(|own| (bin, own)));
     let mut left: Vec<Held> = held.filter(|(_, own)| size(*own) > 0.0).collect();
-    let mut largest = size(all);
+    let mut largest = told;
     let mut found = vec![];
     loop {
         let least = largest * f64::from(-LEAST_SHARE_BITS).exp2();
         let (together, smaller): (Vec<Held>, Vec<Held>) =
             left.into_iter().partition(|(_, own)| size(*own) >= least);
         // The first are those that the scale of all values tells.
-        if largest < size(all) {
+        if largest < told {
             found.extend(of_like_size(&together, steps_of));
         }
         let next = smaller.iter().map(|(_, own)| size(*own));
@@ -110,5 +113,9 @@ mod tests {
         // A small step beside a large one in one bin is as small in its mean.
         assert!(small_bins(&extremes, &[vec![0, 2], vec![1, 6]]).is_empty());
         assert!(small_bins(&Extremes::new(), &steps_of).is_empty());
+        // Beside what a scale may hold all of them are small, and no bin without steps is.
+        let found = bins_below(1e9, &extremes, &[vec![], vec![2, 4], vec![0]]);
+        let bins: Vec<Vec<usize>> = found.iter().map(|own| own.bins.clone()).collect();
+        assert_eq!(bins, [vec![2], vec![1]]);
     }
 }

@@ -27,7 +27,7 @@ pub(super) struct Weighed {
     pub(super) shape: Shape,
     /// Address of what is summed, and of what coverage counts.
     pub(super) addresses: [Arc<str>; 2],
-    whole: Arc<RegionWeights>,
+    pub(super) whole: Arc<RegionWeights>,
     covered: Arc<RegionWeights>,
     pub(super) unit: WeightUnit,
     /// How large it is wherever the grid lies: m², m or 1.

@@ -33,7 +33,7 @@ use super::tables::Tables;
 use super::told::told;
 use super::worked_out::AnswerFunction;
 use super::yielding::Yielding;
-use super::{analysis, batches, budget, compared, joined, statistics, substituted};
+use super::{analysis, batches, budget, checked, compared, joined, statistics, substituted};
 use crate::expression::udf::number_functions;
 use crate::{ComputeError, Engine};
 
@@ -83,6 +83,7 @@ impl Sql {
             functions.push(Arc::new(AggregateUDF::from(MeanWeighted::new())));
         }
         let builder = builder
+            .with_analyzer_rule(checked::rule())
             .with_physical_optimizer_rules(sound_rules())
             .with_physical_optimizer_rule(Arc::new(Yielding));
         Ok(Self {

@@ -11,9 +11,12 @@ use futures::future::BoxFuture;
 
 use crate::budget::Measure;
 use crate::budget::fixed::{AREA_DECIMALS, MASS_DECIMALS};
-use crate::budget::over_region::{AskedArea, extent_of, over_region};
+use crate::budget::over_region::{AskedArea, extent_of, over_region, weights};
 use crate::budget::rows::{StepSum, coverage_percent};
+use crate::complete_sums::told_of_sums;
+use crate::derive::accumulated_from;
 use crate::reduce::{RegionMeans, StepMean, means_over_region};
+use crate::region::loaded::weights_failed;
 use crate::summed::check_averaged;
 use crate::{ComputeError, Engine, catalogue};
 
@@ -46,11 +49,14 @@ pub fn region_series_of<'a>(
             Quantity::Open(_) => true,
             _ => extent_of(engine, asked_area(query)).await?.area_m2 < SMALL_M2,
         };
-        let means = if has_own_steps {
+        let mut means = if has_own_steps {
             in_own_steps(engine, query, manifest, &id).await?
         } else {
             in_steps_of_masses(engine, query, manifest).await?
         };
+        means
+            .notes
+            .extend(incomplete(engine, query, manifest).await?);
         let display = manifest.quantity.display();
         let value = |step: &StepMean| RegionValue {
             start: step.period.start,
@@ -71,6 +77,23 @@ pub fn region_series_of<'a>(
             earth: query.earth,
         })
     })
+}
+
+/// What is to be said of sums of accumulated carbon.
+async fn incomplete(
+    engine: &Engine,
+    query: &RegionSeriesQuery,
+    manifest: &Manifest,
+) -> Result<Option<String>, ComputeError> {
+    let (_window, inside) = manifest.steps_inside(query.from, query.to)?;
+    let is_accumulated = accumulated_from(manifest).is_some();
+    let Some(last) = inside.last().filter(|_| is_accumulated) else {
+        return Ok(None);
+    };
+    let address = weights(engine, manifest, asked_area(query)).await?.all;
+    let areas = engine.objects().weights(&address).await;
+    let areas = areas.map_err(weights_failed)?;
+    told_of_sums(engine, manifest, &areas, last).await
 }
 
 fn asked_area(query: &RegionSeriesQuery) -> AskedArea<'_> {

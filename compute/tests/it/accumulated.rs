@@ -3,15 +3,21 @@
 use std::sync::Mutex;
 
 use compute::derive::{DeriveProgress, derive_statistic, derived};
+use compute::reduce::statistics;
+use compute::stats::region_series;
 use compute::{Engine, budget, derive_accumulated, point_series};
 use contract::analysis::{MapOptions, MapStatistic};
 use contract::budget::BudgetQuery;
 use contract::earth::Earth;
 use contract::event::Body;
+use contract::geometry::{AskedGeometry, Sampling};
 use contract::grid::Grid;
 use contract::manifest::Manifest;
 use contract::product::ProductId;
 use contract::quantity::Quantity;
+use contract::region::AskedRegion;
+use contract::series::RegionSeriesQuery;
+use contract::statistics::StatisticsQuery;
 use contract::time::{Period, TimeMs, TimeStep};
 use storage::Store;
 use storage::contributed::{self, Contributed};
@@ -318,6 +324,52 @@ async fn a_budget_of_sums_is_that_of_their_flux_and_says_which_are_complete() {
     assert_eq!(ask(&engine, &early).await.rows[0].start, start);
 }
 
+/// Notes of statistics and of the series over a region until an instant.
+async fn notes(engine: &Engine, name: &ProductId, region: &str, to: &str) -> Vec<String> {
+    let region: AskedRegion = region.parse().unwrap();
+    let to = to.parse().ok();
+    let asked = StatisticsQuery {
+        to,
+        ..StatisticsQuery::new(name.clone(), region.clone().into())
+    };
+    let found = statistics(engine, &asked).await.unwrap().notes;
+    let asked = RegionSeriesQuery {
+        to,
+        ..RegionSeriesQuery::new(name.clone(), region)
+    };
+    let series = region_series(engine, &asked).await.unwrap();
+    assert_eq!(found, series.notes);
+    found
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn statistics_of_sums_say_how_much_of_them_is_not_complete() {
+    let (_folder, store) = folder_store();
+    let (id, flux) = (product("tiny"), Quantity::CarbonFlux);
+    land(&store, &id, flux, TINY, &tiny_year()).await;
+    let engine = Engine::local(store.clone());
+    let derived = derive(&engine, "tiny", None).await;
+    let sums = &derived.product;
+    // The second of three cells lacks February, the third has no data at all.
+    let whole = notes(&engine, sums, "0,0,3,1", "2001-05-01").await;
+    let told = "sums since 2001-01-01T00:00:00Z until 2001-05-01T00:00:00Z: those of 50.00 % of what has any lack some of that time, which adds nothing to \
+                them; all together hold 88.33 % of it";
+    assert_eq!(whole, [told]);
+    let none = Vec::<String>::new();
+    // January is complete, and so is the first cell.
+    assert_eq!(notes(&engine, sums, "0,0,3,1", "2001-02-01").await, none);
+    assert_eq!(notes(&engine, sums, "0,0,1,1", "2001-05-01").await, none);
+    assert_eq!(notes(&engine, &id, "0,0,3,1", "2001-05-01").await, none);
+    // Of one cell, and along a line.
+    let point = AskedGeometry::point(place(1.5), Sampling::Cell);
+    let line = AskedGeometry::line("0.1,0.5;1.9,0.5").unwrap();
+    for (asked, share) in [(point, "100.00 %"), (line, "50.00 %")] {
+        let query = StatisticsQuery::new(sums.clone(), asked);
+        let found = statistics(&engine, &query).await.unwrap().notes;
+        assert!(found[0].contains(share), "{found:?}");
+    }
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn days_of_a_budget_of_sums_read_what_its_months_read() {
     let (_folder, store) = folder_store();
@@ -359,6 +411,8 @@ async fn a_version_that_did_not_count_has_a_budget_of_unknown_completeness() {
     let answer = ask(&engine, &total(&old.product, "global")).await;
     assert_eq!(answer.manifest, old.id());
     assert_eq!(answer.rows[0].completeness, None);
+    let told = notes(&engine, &old.product, "0,0,3,1", "2001-05-01").await;
+    assert!(told[0].contains("was not counted"), "{told:?}");
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -738,6 +738,71 @@ async fn a_condition_that_doubles_where_columns_are_written_out_is_refused() {
     }
 }
 
+/// They went on from the other end: a step after the largest was the smallest, and 3 less 5 was 4294967294.
+#[tokio::test(flavor = "multi_thread")]
+async fn whole_numbers_that_leave_their_type_are_refused_and_all_others_are_computed_as_before() {
+    let (_folder, store) = folder_store();
+    sst(&store).await;
+    let sql = sql_of(&Engine::in_process(store, parts(2)));
+    let of = "FROM (VALUES (9223372036854775807), (NULL), (3)) AS v(n)";
+    for text in [
+        "SELECT 9223372036854775807 + 1".to_owned(),
+        "SELECT -9223372036854775807 - 2".to_owned(),
+        "SELECT 4294967296 * 4294967296".to_owned(),
+        format!("SELECT n + 1 {of}"),
+        format!("SELECT count(*) {of} WHERE n * 2 > 0"),
+        format!("SELECT max(n + n) {of} GROUP BY n - 3"),
+        "SELECT step_count - step_count - step_count FROM stats('sst-test', '162.3,0.5')"
+            .to_owned(),
+    ] {
+        let error = ask(&sql, &text).await.unwrap_err();
+        assert!(!error.is_retryable(), "{text}: {error}");
+        let told = error.to_string();
+        assert!(told.contains("do not hold what comes of this"), "{told}");
+    }
+    let whole = "SELECT n + 1 AS a, n - 5, 2 * n + n * n FROM (VALUES (3), (NULL), (-4)) AS v(n)";
+    assert_eq!(
+        texts(&sql, whole).await,
+        [["4", "-2", "15"], ["", "", ""], ["-3", "-9", "8"]]
+    );
+    // Columns are called as before, and questions are put together from them.
+    let batch = ask(
+        &sql,
+        "SELECT 1 + 1, sum(n + 1) FROM (VALUES (3), (4)) AS v(n)",
+    );
+    let batch = batch.await.unwrap();
+    let names: Vec<&String> = batch
+        .schema_ref()
+        .fields()
+        .iter()
+        .map(|f| f.name())
+        .collect();
+    assert_eq!(names, ["Int64(1) + Int64(1)", "sum(v.n + Int64(1))"]);
+    let grouped = "SELECT n * 2, count(*), sum(n + 1) OVER (ORDER BY n * 2) FROM (VALUES (3), (4), (4)) AS v(n)
+        GROUP BY n, n * 2 HAVING n * 2 > 0 ORDER BY n * 2 DESC LIMIT 1 + 1";
+    assert_eq!(
+        texts(&sql, grouped).await,
+        [["8", "2", "9"], ["6", "1", "4"]]
+    );
+    let rolled = "SELECT n * 2, count(*) FROM (VALUES (3), (4), (4)) AS v(n) GROUP BY ROLLUP (n * 2) ORDER BY 2";
+    assert_eq!(
+        texts(&sql, rolled).await,
+        [["6", "1"], ["8", "2"], ["", "3"]]
+    );
+    let counting = "WITH RECURSIVE t AS (SELECT 1 AS n UNION ALL SELECT n + 1 FROM t WHERE n < 9) SELECT sum(n) FROM t";
+    assert_eq!(one(&sql, counting).await, "45");
+    let joined = "SELECT count(*) FROM (VALUES (1), (2), (3)) AS a(n) JOIN (VALUES (2), (3), (4)) AS b(n) ON a.n + 1 = b.n
+        WHERE a.n IN (SELECT n - 1 FROM (VALUES (3), (4)) AS c(n))";
+    assert_eq!(one(&sql, joined).await, "2");
+    // Numbers that are no whole ones, and instants, are none of this.
+    assert_eq!(
+        one(&sql, "SELECT 9223372036854775807 + 1.0e0").await,
+        "9.223372036854776e18"
+    );
+    let chained = format!("SELECT 0{}", " + 1".repeat(490));
+    assert_eq!(one(&sql, &chained).await, "490");
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn a_question_that_never_ends_is_ended_and_so_is_one_that_nobody_waits_for() {
     let (_folder, store) = folder_store();

@@ -278,6 +278,55 @@ async fn steps_far_smaller_than_others_have_their_own_means_and_the_same_bits_in
     }
 }
 
+/// Carbon that has just begun to accumulate: in the scale of what it may come to, ten thousandths of it were lost.
+#[tokio::test(flavor = "multi_thread")]
+async fn first_sums_of_accumulated_carbon_have_their_means_however_small_they_are() {
+    let (_folder, store) = folder_store();
+    let mut steps = wavy_year(&GRID);
+    for (at, (_period, values)) in steps.iter_mut().enumerate() {
+        let factor = 10f64.powi(at as i32 - 9) / 1e-9;
+        let scaled = |value: &mut f32| *value = (f64::from(*value) * factor) as f32;
+        values.iter_mut().for_each(scaled);
+    }
+    let quantity = Quantity::AccumulatedCarbon;
+    land(&store, &product("wavy"), quantity, GRID, &steps).await;
+    let weights = weights::compute(&GRID, &POLYGON.parse().unwrap(), Earth::Wgs84).unwrap();
+    let display = quantity.display();
+    let engine = Engine::in_process(store.clone(), parts(2));
+    let query = asked(area(POLYGON), "mean", TimeStep::Native);
+    let answer = statistics(&engine, &query).await.unwrap();
+    assert_eq!(answer.rows.len(), 12);
+    for (at, step) in steps.iter().enumerate() {
+        let held = weighed(std::slice::from_ref(step), &weights, &GRID);
+        let right = plain(&held, 50.0)[0] * display.factor;
+        let found = value(&answer, at, "mean");
+        assert!((found / right - 1.0).abs() < 1e-6, "{at}: {found} {right}");
+    }
+    // In one cell nothing levels what is rounded.
+    let place = LonLatDeg::new(171.3, -40.2).unwrap();
+    let (row, col) = GRID.cell_at(place).unwrap();
+    let cell = (row * GRID.cols + col) as usize;
+    let query = asked(
+        AskedGeometry::point(place, Sampling::Cell),
+        "mean,std",
+        TimeStep::Native,
+    );
+    let answer = statistics(&engine, &query).await.unwrap();
+    let held = steps.iter().enumerate();
+    let held: Vec<_> = held.filter(|(_, step)| !step.1[cell].is_nan()).collect();
+    assert!(held.len() > 6 && held[0].0 < 3, "{held:?}");
+    for (at, (_period, values)) in held {
+        let right = f64::from(values[cell]) * display.factor;
+        let found = value(&answer, at, "mean");
+        assert!((found / right - 1.0).abs() < 1e-6, "{at}: {found} {right}");
+        assert_eq!(answer.rows[at].values["std"], Some(0.0));
+    }
+    for count in [1, 7] {
+        let other = Engine::standalone(store.clone(), parts(count));
+        assert!(statistics(&other, &query).await.unwrap() == answer);
+    }
+}
+
 /// Answers to some questions.
 async fn answers(engine: &Engine) -> Vec<StatisticsAnswer> {
     let place = LonLatDeg::new(171.3, -40.2).unwrap();

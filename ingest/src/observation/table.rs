@@ -30,7 +30,7 @@ const STATION_DEG: f64 = 0.01;
 
 /// Does the head of a file hold a line of column names?
 pub(super) fn has_columns(head: &[u8]) -> bool {
-    columns(head).is_some()
+    columns(head, Columns::of).is_some()
 }
 
 /// Grid cells by latitude and longitude under plain numbers: `"","Grid_lat","Grid_long","1","2"`.
@@ -54,15 +54,15 @@ pub(super) fn undated() -> Rejection {
     Rejection::new(RejectReason::Time, "columns", detail)
 }
 
-/// The columns, and where their line ends.
-fn columns(content: &[u8]) -> Option<(Columns, usize)> {
+/// The columns that a line names as `of` reads it, and where that line ends.
+fn columns(content: &[u8], of: fn(&str) -> Option<Columns>) -> Option<(Columns, usize)> {
     let mut start = 0;
     for line in content
         .split_inclusive(|b| *b == b'\n')
         .take(MAX_COMMENT_LINES)
     {
         start += line.len();
-        let found = std::str::from_utf8(line).ok().and_then(Columns::of);
+        let found = std::str::from_utf8(line).ok().and_then(of);
         if let Some(columns) = found {
             return Some((columns, start));
         }
@@ -79,7 +79,14 @@ pub(super) fn read(content: &[u8], source: Source<'_>) -> Result<Found, Rejectio
             "has no column of place and time",
         )
     };
-    let (columns, start) = columns(content).ok_or_else(none)?;
+    let (of_surface, start) = columns(content, Columns::of).ok_or_else(none)?;
+    let is_of_depths = reaches_down(&of_surface, &content[start..]);
+    let columns = if is_of_depths {
+        let (of_depths, _) = columns(content, Columns::of_depths).ok_or_else(none)?;
+        of_depths
+    } else {
+        of_surface
+    };
     let content = &content[start..];
     check(&columns)?;
     let is_socat = columns.measured.iter().any(|m| m.is_flagged);
@@ -87,7 +94,7 @@ pub(super) fn read(content: &[u8], source: Source<'_>) -> Result<Found, Rejectio
     let mut reading = TableReader {
         dataset: name::dataset(source, if is_socat { "socat" } else { stem }),
         lone_platform: name::platform(stem).unwrap_or_else(|| "1".to_owned()),
-        is_of_depths: reaches_down(&columns, content),
+        is_of_depths,
         gathered: Gathered::default(),
         spans: BTreeMap::new(),
     };
@@ -487,6 +494,21 @@ mod tests {
         assert_eq!((at_surface(&found), found.masked.implausible), (3, 0));
         let found = read(table("800").as_bytes(), SOURCE).unwrap();
         assert_eq!((at_surface(&found), found.masked.implausible), (0, 3));
+    }
+
+    #[test]
+    fn temperatures_and_salinities_of_casts_are_not_called_those_of_the_surface() {
+        let names = |depth: &str| {
+            let table = format!("{TABLE}{}", row(depth, "31.5", 1)).replace("SST [", "Temp [");
+            let found = read(table.as_bytes(), SOURCE).unwrap().observations;
+            let names = found.into_iter().map(|o| o.property);
+            names.collect::<std::collections::BTreeSet<String>>()
+        };
+        let fugacity = "fugacity_of_carbon_dioxide_in_sea_water";
+        let surface = ["sea_surface_salinity", "sea_surface_temperature"];
+        assert!(names("20").iter().eq([fugacity, surface[0], surface[1]]));
+        let water = ["sea_water_practical_salinity", "sea_water_temperature"];
+        assert!(names("800").iter().eq([fugacity, water[0], water[1]]));
     }
 
     #[test]

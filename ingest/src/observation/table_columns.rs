@@ -24,6 +24,8 @@ pub(super) struct Columns {
     pub(super) clock: [Option<usize>; 6],
     /// Is there one more that says it is of the place, and not UTC?
     is_local: bool,
+    /// Do samples come from depths of all kinds?
+    is_of_depths: bool,
     pub(super) measured: Vec<Measured>,
     /// Columns of what is measured that are not read, and why.
     pub(super) passed_over: Vec<Rejection>,
@@ -126,10 +128,28 @@ const MEASURED: &[Known] = &[
     ),
 ];
 
+/// What short names mean where samples come from depths of all kinds, as they do in files of casts: none of them says that it is of the surface.
+const OF_DEPTHS: &[(Names, &str)] = &[
+    (&["temp", "temperature"], "sea_water_temperature"),
+    (&["sal", "salinity"], "sea_water_practical_salinity"),
+];
+
 impl Columns {
     /// The columns that a line names; none if it names neither place nor time.
     pub(super) fn of(line: &str) -> Option<Self> {
-        let mut columns = Self::default();
+        Self::named(line, false)
+    }
+
+    /// The same of a table whose samples come from depths of all kinds.
+    pub(super) fn of_depths(line: &str) -> Option<Self> {
+        Self::named(line, true)
+    }
+
+    fn named(line: &str, is_of_depths: bool) -> Option<Self> {
+        let mut columns = Self {
+            is_of_depths,
+            ..Self::default()
+        };
         for (at, field) in line
             .trim_end_matches(['\r', '\n'])
             .split('\t')
@@ -202,9 +222,12 @@ impl Columns {
             let rank = known.0.iter().position(|own| *own == name)?;
             Some((known, rank))
         });
-        let Some(((_, property, usual, height_m, is_flagged), rank)) = known else {
+        let Some(((_, of_surface, usual, height_m, is_flagged), rank)) = known else {
             return;
         };
+        let mut of_depths = OF_DEPTHS.iter().filter(|_| self.is_of_depths);
+        let of_depths = of_depths.find(|(names, _)| names.contains(&name));
+        let property = of_depths.map_or(of_surface, |(_, property)| property);
         let conversion = match Conversion::new(property, unit.unwrap_or(usual)) {
             Ok(conversion) => conversion,
             Err(wrong) => {
@@ -308,6 +331,35 @@ mod tests {
             (columns.platform, columns.depth, columns.flag),
             (Some(0), Some((4, Some(1.0))), Some(9))
         );
+    }
+
+    #[test]
+    fn short_names_are_of_the_surface_only_where_all_samples_are() {
+        let line = "yr\tmon\tday\tlat\tlon\tdepth [m]\tTemp [C]\tsal\tSST [C]\tfCO2rec [uatm]";
+        let properties = |columns: Option<Columns>| {
+            let columns = columns.unwrap();
+            let found = columns.measured.iter();
+            let found = found.map(|m| (m.at, m.conversion.property.clone()));
+            (found.collect::<Vec<_>>(), columns.passed_over.len())
+        };
+        let named = |all: &[(usize, &str)]| {
+            let all = all.iter().map(|(at, name)| (*at, (*name).to_owned()));
+            all.collect::<Vec<_>>()
+        };
+        let fugacity = "fugacity_of_carbon_dioxide_in_sea_water";
+        let surface = [
+            (8, "sea_surface_temperature"),
+            (7, "sea_surface_salinity"),
+            (9, fugacity),
+        ];
+        assert_eq!(properties(Columns::of(line)), (named(&surface), 1));
+        let of_casts = [
+            (6, "sea_water_temperature"),
+            (7, "sea_water_practical_salinity"),
+            (8, "sea_surface_temperature"),
+            (9, fugacity),
+        ];
+        assert_eq!(properties(Columns::of_depths(line)), (named(&of_casts), 0));
     }
 
     #[test]

@@ -25,7 +25,8 @@ use crate::plan::profile::Profile;
 ///    temperatures and percentiles are not taken for the quantity, and notes tell of steps without any value and of climatologies.
 /// 9: axes of single precision lie at the round numbers that they stand for, bounds of axes are read in every shape that has one
 ///    meaning, and axes of one label whose bounds say how wide their cell is are read.
-pub(crate) const DECODER: u32 = 9;
+/// 10: axes lie where their labels say, as exactly as these do, and at round numbers only as far as labels leave room for them.
+pub(crate) const DECODER: u32 = 10;
 
 /// How a file was read.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]

@@ -342,7 +342,7 @@ async fn a_known_file_is_read_as_the_fields_of_this_decoders_version() {
             values.extend(value.to_le_bytes());
         }
     }
-    let (decoder, digest) = (9, Digest::of(&values).short());
+    let (decoder, digest) = (10, Digest::of(&values).short());
     let notes = place.store.list("readings").await.unwrap();
     let note = place.store.get(&notes[0]).await.unwrap();
     let note: serde_json::Value = serde_json::from_slice(&note).unwrap();

@@ -11,6 +11,7 @@ use contract::time::{Period, TimeMs};
 
 use super::claim::{Claim, is_later_or_same};
 use crate::error::Rejection;
+use crate::plan::cf::snapped::evened;
 use crate::put::StoredGranule;
 
 /// Grids whose edges differ by less than this, in cells, are one grid.
@@ -209,8 +210,13 @@ fn of_unit(quantity: Quantity) -> String {
     }
 }
 
-/// Are they one grid, but for the last digits of axes that two files have, or that were rounded when one of them was read?
+/// Are they one grid, but for the last digits of axes that two files have, or that were rounded when one of them was read, or for the round
+/// places that steps and edges were moved to then?
 pub(crate) fn is_same_grid(a: &Grid, b: &Grid) -> bool {
+    is_almost(a, b) || is_almost(&evened(a), b) || is_almost(a, &evened(b))
+}
+
+fn is_almost(a: &Grid, b: &Grid) -> bool {
     is_near(a, b, |edge_deg, cell_deg| {
         let rounding_deg = 2.0 * f64::from(f32::EPSILON) * edge_deg.abs();
         let rounding_deg = rounding_deg.min(SAME_ROUNDED_CELLS * cell_deg);

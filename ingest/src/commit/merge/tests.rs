@@ -205,6 +205,32 @@ fn axes_that_differ_by_their_rounding_are_of_one_grid() {
 }
 
 #[test]
+fn a_product_that_landed_at_rounder_places_takes_files_whose_labels_are_taken_at_their_word() {
+    let exact = Grid {
+        rows: 7,
+        cols: 144,
+        north_deg: 90.0,
+        west_deg: -179.997,
+        dlat_deg: 180.0 / 7.0,
+        dlon_deg: 2.5,
+    };
+    let rounder = Grid {
+        north_deg: 3.5 * 617.0 / 24.0,
+        west_deg: -180.0,
+        dlat_deg: 617.0 / 24.0,
+        ..exact
+    };
+    assert!(is_same_grid(&exact, &rounder) && is_same_grid(&rounder, &exact));
+    assert!(!is_equal_grid(&exact, &rounder));
+    // What no file was ever moved to is another grid.
+    let beside = Grid {
+        west_deg: -180.003,
+        ..rounder
+    };
+    assert!(!is_same_grid(&exact, &beside));
+}
+
+#[test]
 fn a_group_ends_before_the_first_period_that_comes_again() {
     let files = [
         granule("a", &[month(1)]),

@@ -6,17 +6,12 @@ use serde::{Deserialize, Serialize};
 
 use super::coordinate::Role;
 use super::single;
+use super::snapped::{SNAP_CELLS, Slack, closed_step, snapped_edge, snapped_step};
 use crate::error::Rejection;
 
 /// How far a label may stand from its place on a regular axis, in cells. Labels in float32 stay well below; those of a Gaussian
 /// grid stay below too (0.5 % of a cell with 8 latitudes, 1.4 % with 512), and that is told.
 const TOLERANCE_CELLS: f64 = 0.02;
-/// Edges and steps closer than this (in cells) to a round fraction of a degree are taken to be that. Labels that are farther from
-/// their places are told of.
-const SNAP_CELLS: f64 = 2e-3;
-/// A longitude axis that misses the whole turn by less than this (in cells) was meant to make one: labels of single
-/// precision that were summed up drift so far.
-const TURN_CELLS: f64 = 0.05;
 
 /// What the labels of a grid's axes name.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize)]
@@ -52,12 +47,22 @@ pub(crate) struct Labels<'a> {
     pub(crate) only_deg: Option<f64>,
 }
 
-/// A regular axis: first label, step (signed), count.
+/// A regular axis: first label, step (signed), count, and how far the farthest label is from its place, degrees.
 #[derive(Debug, Clone, Copy)]
 struct Regular {
     first: f64,
     step: f64,
     count: u32,
+    uneven_deg: f64,
+}
+
+/// The labels of an axis, as the file has them and without jumps by a turn, the regular axis that they make, and how exact they are.
+#[derive(Debug, Clone, Copy)]
+struct Fitted<'a> {
+    deg: &'a [f64],
+    places: &'a [f64],
+    axis: Regular,
+    slack: Slack,
 }
 
 impl Mapping {
@@ -67,14 +72,35 @@ impl Mapping {
         registration: Registration,
         names: [&str; 2],
     ) -> Result<Self, Rejection> {
-        let (lat_deg, lon_deg) = (lat.deg, unwrapped(lon.deg));
-        let fitted = [
-            regular(lat_deg, lat.only_deg, names[0])?,
-            regular(&lon_deg, lon.only_deg, names[1])?,
+        let lon_places = unwrapped(lon.deg);
+        let lat = Fitted::of(lat, lat.deg, names[0])?;
+        let lon = Fitted::of(lon, &lon_places, names[1])?;
+        let taken = Self::of_fitted([lat, lon], registration, names);
+        // What leads past a pole by a hair where labels are taken at their word was meant to end there.
+        taken.or_else(|_refused| {
+            let open = Fitted {
+                slack: Slack::UNKNOWN,
+                ..lat
+            };
+            Self::of_fitted([open, lon], registration, names)
+        })
+    }
+
+    fn of_fitted(
+        [lat_labels, lon_labels]: [Fitted<'_>; 2],
+        registration: Registration,
+        names: [&str; 2],
+    ) -> Result<Self, Rejection> {
+        let cells = [
+            lat_labels.snapped(snapped_step),
+            lon_labels.snapped(closed_step),
         ];
-        let (lat, dlat) = meant(fitted[0], (lat_deg, lat_deg), snapped_step(fitted[0]));
-        let (lon, dlon) = meant(fitted[1], (lon.deg, &lon_deg), closed_step(fitted[1]));
-        if lat_deg.iter().any(|v| v.abs() > 90.0 + lat.step.abs()) {
+        let [lat_slack, lon_slack] = [(lat_labels, cells[0]), (lon_labels, cells[1])]
+            .map(|(labels, cell_deg)| labels.edge_slack_deg(cell_deg));
+        let (lat, dlat) = meant(lat_labels, cells[0]);
+        let (lon, dlon) = meant(lon_labels, cells[1]);
+        let is_beyond = |v: &f64| v.abs() > 90.0 + lat.step.abs();
+        if lat_labels.deg.iter().any(is_beyond) {
             return Err(refused(
                 names[0],
                 "goes past the poles; latitudes are in degrees, -90 to 90",
@@ -91,8 +117,8 @@ impl Mapping {
         } else {
             lon.last()
         };
-        let mut north = snapped_edge(northernmost + north_shift * dlat, dlat);
-        let west = snapped_edge(westernmost - west_shift * dlon, dlon);
+        let mut north = snapped_edge(northernmost + north_shift * dlat, dlat, lat_slack);
+        let west = westernmost - west_shift * dlon;
         let mut file_rows: Vec<u32> = if lat.step > 0.0 {
             (0..lat.count).rev().collect()
         } else {
@@ -113,7 +139,14 @@ impl Mapping {
         } else {
             (0..lon.count).rev().collect()
         };
-        Self::turned(north, west, [dlat, dlon], file_rows, file_cols, names)
+        let step = [dlat, dlon];
+        Self::turned(
+            north,
+            (west, lon_slack),
+            step,
+            [file_rows, file_cols],
+            names,
+        )
     }
 
     /// How far the farthest label of an axis is from the place that the grid has for it, degrees, and the same in cells; none if
@@ -163,21 +196,19 @@ impl Mapping {
         let step = [grid.dlat_deg, grid.dlon_deg];
         Self::turned(
             grid.north_deg,
-            grid.west_deg,
+            (grid.west_deg, f64::INFINITY),
             step,
-            file_rows,
-            (0..grid.cols).collect(),
+            [file_rows, (0..grid.cols).collect()],
             ["grid", "grid"],
         )
     }
 
-    /// Turns global grids so that they start at -180, and others so that their western edge is in [-180, 180).
+    /// Turns global grids so that they start at -180, and others so that their western edge, which may be off by so much, is in [-180, 180).
     fn turned(
         north_deg: f64,
-        west_deg: f64,
+        (west_deg, slack_deg): (f64, f64),
         [dlat, dlon]: [f64; 2],
-        file_rows: Vec<u32>,
-        mut file_cols: Vec<u32>,
+        [file_rows, mut file_cols]: [Vec<u32>; 2],
         names: [&str; 2],
     ) -> Result<Self, Rejection> {
         let around = f64::from(file_cols.len() as u32) * dlon;
@@ -186,7 +217,8 @@ impl Mapping {
             file_cols.pop();
         }
         let cols = file_cols.len() as u32;
-        let mut west_deg = snapped_edge(wrap_lon_deg(west_deg), dlon);
+        let west_deg = snapped_edge(west_deg, dlon, slack_deg);
+        let mut west_deg = snapped_edge(wrap_lon_deg(west_deg), dlon, slack_deg);
         if west_deg >= 180.0 {
             west_deg -= 360.0;
         }
@@ -194,7 +226,12 @@ impl Mapping {
             // The first column whose western edge is at or east of -180.
             let skipped = ((180.0 - west_deg) / dlon - SNAP_CELLS).ceil().max(0.0) as u32 % cols;
             file_cols.rotate_left(skipped as usize);
-            west_deg = snapped_edge(wrap_lon_deg(west_deg + f64::from(skipped) * dlon), dlon);
+            west_deg = wrap_lon_deg(west_deg + f64::from(skipped) * dlon);
+            west_deg = snapped_edge(west_deg, dlon, slack_deg);
+            // A hair before the date line, which all but a hair of the first column lies behind.
+            if 180.0 - west_deg < SNAP_CELLS * dlon {
+                west_deg = -180.0;
+            }
         }
         let grid = Grid {
             rows: file_rows.len() as u32,
@@ -244,6 +281,30 @@ impl Regular {
     }
 }
 
+impl<'a> Fitted<'a> {
+    /// `places`: the labels without jumps.
+    fn of(labels: Labels<'a>, places: &'a [f64], name: &str) -> Result<Self, Rejection> {
+        let axis = regular(places, labels.only_deg, name)?;
+        Ok(Self {
+            deg: labels.deg,
+            places,
+            axis,
+            slack: Slack::of(labels.deg, axis.step.abs(), axis.uneven_deg),
+        })
+    }
+
+    /// The width of a cell, degrees, by its step.
+    fn snapped(&self, snap: impl Fn(f64, u32, Slack) -> f64) -> f64 {
+        snap(self.axis.step.abs(), self.axis.count, self.slack)
+    }
+
+    /// How far an edge may be off, degrees, with cells so wide.
+    fn edge_slack_deg(&self, cell_deg: f64) -> f64 {
+        let drift_deg = (cell_deg - self.axis.step.abs()).abs() * f64::from(self.axis.count);
+        self.slack.edge_deg + drift_deg
+    }
+}
+
 /// The largest distance from 0.
 fn farthest(numbers: impl Iterator<Item = f64>) -> f64 {
     numbers.fold(0.0, |most, number| most.max(number.abs()))
@@ -286,7 +347,12 @@ fn regular(labels: &[f64], only_deg: Option<f64>, name: &str) -> Result<Regular,
     if count == 1 {
         let detail = "has one label and no bounds, so that nothing says how wide its cell is: give it two edges (bounds), or state the grid in a profile";
         let step = only_deg.ok_or_else(|| refused(name, detail))?;
-        return Ok(Regular { first, step, count });
+        return Ok(Regular {
+            first,
+            step,
+            count,
+            uneven_deg: 0.0,
+        });
     }
     let step = (labels[labels.len() - 1] - first) / f64::from(count - 1);
     let worst = labels
@@ -301,19 +367,25 @@ fn regular(labels: &[f64], only_deg: Option<f64>, name: &str) -> Result<Regular,
         );
         return Err(refused(name, &detail));
     }
-    Ok(Regular { first, step, count })
+    Ok(Regular {
+        first,
+        step,
+        count,
+        uneven_deg: worst,
+    })
 }
 
 /// An axis and the width of its cells, degrees: as they are fitted and taken to be, or, of labels of single precision, as they were
 /// before these were rounded.
-fn meant(fitted: Regular, (labels, places): (&[f64], &[f64]), cell_deg: f64) -> (Regular, f64) {
+fn meant(labels: Fitted<'_>, cell_deg: f64) -> (Regular, f64) {
+    let fitted = labels.axis;
     // The width of one cell is what its edges say.
     if fitted.count == 1 {
         return (fitted, fitted.step);
     }
     let is_round = (cell_deg - fitted.step.abs()).abs() > 0.0;
     let round_deg = is_round.then(|| cell_deg.copysign(fitted.step));
-    match single::meant(labels, places, fitted.step, round_deg) {
+    match single::meant(labels.deg, labels.places, fitted.step, round_deg) {
         Some([first, step]) => {
             let meant = Regular {
                 first,
@@ -323,42 +395,6 @@ fn meant(fitted: Regular, (labels, places): (&[f64], &[f64]), cell_deg: f64) -> 
             (meant, step.abs())
         }
         None => (fitted, cell_deg),
-    }
-}
-
-/// A step as the round fraction (1/60) or multiple (2.5) of a degree it was meant to be, if it is close to one.
-fn snapped_step(axis: Regular) -> f64 {
-    let step = axis.step.abs();
-    for denominator in [
-        1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 20.0, 24.0, 60.0, 100.0, 120.0,
-    ] {
-        let numerator = (step * denominator).round();
-        let round = numerator / denominator;
-        // Over the whole axis the round step may not drift by more than this.
-        if numerator >= 1.0 && (step / round - 1.0).abs() * f64::from(axis.count) < SNAP_CELLS {
-            return round;
-        }
-    }
-    step
-}
-
-/// A step of longitudes: the part of a turn that it was meant to be, if it is close to one.
-fn closed_step(axis: Regular) -> f64 {
-    let step = axis.step.abs();
-    let missed = (step * f64::from(axis.count) - 360.0).abs();
-    if missed < TURN_CELLS * step {
-        return 360.0 / f64::from(axis.count);
-    }
-    snapped_step(axis)
-}
-
-/// An edge as the multiple of half a cell it was meant to be, if it is close to one.
-fn snapped_edge(edge: f64, step: f64) -> f64 {
-    let halves = (edge / step * 2.0).round();
-    if (edge / step * 2.0 - halves).abs() < 2.0 * SNAP_CELLS {
-        halves * step / 2.0
-    } else {
-        edge
     }
 }
 
@@ -450,6 +486,52 @@ mod tests {
             map(&lat, &lon, Registration::SouthEast).unwrap().grid,
             ONE_DEGREE
         );
+    }
+
+    #[test]
+    fn labels_of_many_digits_lie_where_they_say_and_those_of_few_where_they_are_meant() {
+        let lon = labels(0.5, 1.0, 360);
+        let near = |own: f64, wanted: f64| assert!((own - wanted).abs() < 1e-9, "{own} {wanted}");
+        // Seven rows from pole to pole.
+        let sevenths = labels(540.0 / 7.0, -180.0 / 7.0, 7);
+        let m = map(&sevenths, &lon, Registration::Center).unwrap();
+        near(m.grid.dlat_deg, 180.0 / 7.0);
+        near(m.grid.north_deg, 90.0);
+        assert_eq!(
+            m.moved(Role::Latitude, &sevenths, Registration::Center),
+            None
+        );
+        // Edges a thousandth of a cell beside a round place, from the south and from the north, and those of longitudes.
+        let beside = labels(-10.1247, 0.25, 40);
+        let m = map(&beside, &lon, Registration::Center).unwrap();
+        near(m.grid.south_deg(), -10.2497);
+        let m = map(&labels(9.8753, -0.25, 40), &beside, Registration::Center).unwrap();
+        near(m.grid.north_deg, 10.0003);
+        near(m.grid.west_deg, -10.2497);
+        // Thirds of a degree with four digits.
+        let thirds: Vec<f64> = labels(1.0 / 6.0, 1.0 / 3.0, 60);
+        let thirds: Vec<f64> = thirds.iter().map(|v| (v * 1e4).round() / 1e4).collect();
+        let m = map(&thirds, &thirds, Registration::Center).unwrap();
+        assert_eq!((m.grid.dlat_deg, m.grid.dlon_deg), (1.0 / 3.0, 1.0 / 3.0));
+        assert_eq!((m.grid.north_deg, m.grid.west_deg), (20.0, 0.0));
+        // Past a pole by a hair more than a grid may reach.
+        let m = map(&labels(89.5015, -1.0, 180), &lon, Registration::Center).unwrap();
+        assert_eq!(m.grid, ONE_DEGREE);
+    }
+
+    #[test]
+    fn columns_around_the_earth_begin_at_the_date_line_also_a_hair_before_it() {
+        let lat = labels(89.5, -1.0, 180);
+        for (first, west_deg, skipped) in [
+            (-179.5005, -180.0, 0),
+            (-179.4995, -179.9995, 0),
+            (0.4995, -180.0, 180),
+            (0.5005, -179.9995, 180),
+        ] {
+            let m = map(&lat, &labels(first, 1.0, 360), Registration::Center).unwrap();
+            assert!((m.grid.west_deg - west_deg).abs() < 1e-9, "{:?}", m.grid);
+            assert_eq!((m.grid.cols, m.file_cols[0]), (360, skipped));
+        }
     }
 
     #[test]

@@ -14,6 +14,7 @@ pub(crate) mod period;
 pub(crate) mod projection;
 pub(crate) mod quantity;
 mod single;
+pub(crate) mod snapped;
 pub(crate) mod spacing;
 pub(crate) mod unmarked;
 mod year_end;

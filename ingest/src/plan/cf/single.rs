@@ -24,7 +24,7 @@ pub(super) fn meant(
     fitted_deg: f64,
     round_deg: Option<f64>,
 ) -> Option<[f64; 2]> {
-    if !labels.iter().all(|label| is_single(*label)) {
+    if !are_single(labels) {
         return None;
     }
     // Each label may be rounded by itself, or worked out in single precision from numbers as large as the largest.
@@ -111,6 +111,11 @@ fn round_numbers([low, high]: [f64; 2]) -> impl Iterator<Item = (f64, f64)> {
     let numbers = fractions.chain(decimals);
     let numbers = numbers.map(move |parts| ((middle * parts).round() / parts, parts));
     numbers.filter(move |(number, _)| (low..=high).contains(number))
+}
+
+/// Are labels of single precision, or half-way between two such numbers?
+pub(super) fn are_single(labels: &[f64]) -> bool {
+    labels.iter().all(|label| is_single(*label))
 }
 
 /// Is it a number of single precision, or half of the sum of two?
