@@ -111,10 +111,10 @@ impl ScalarUDFImpl for WholeNumbers {
     }
 
     fn return_type(&self, numbers: &[DataType]) -> Result<DataType> {
-        match numbers.first() {
-            Some(kind) => Ok(kind.clone()),
-            None => internal_err!("no whole numbers"),
-        }
+        let Some(kind) = numbers.first() else {
+            return internal_err!("no whole numbers");
+        };
+        Ok(kind.clone())
     }
 
     fn return_field_from_args(&self, args: ReturnFieldArgs<'_>) -> Result<FieldRef> {

@@ -28,7 +28,7 @@ pub(super) struct Slack {
     /// How far the step may lead astray over all of the axis, degrees.
     drift_deg: f64,
     /// Half of the last digit that the step is written with, degrees; 0 where it has many.
-    digit_deg: f64,
+    half_digit: f64,
 }
 
 impl Slack {
@@ -36,7 +36,7 @@ impl Slack {
     pub(super) const UNKNOWN: Self = Self {
         edge_deg: f64::INFINITY,
         drift_deg: f64::INFINITY,
-        digit_deg: 0.0,
+        half_digit: 0.0,
     };
 
     /// That of labels, degrees, which are off by so much from even places `step_deg` apart: a label that was rounded stands as
@@ -57,7 +57,7 @@ impl Slack {
         Self {
             edge_deg: off_deg.max(half_digit(labels)),
             drift_deg: summed_deg.max(2.0 * off_deg),
-            digit_deg: half_digit(&[step_deg]),
+            half_digit: half_digit(&[step_deg]),
         }
     }
 }
@@ -82,7 +82,7 @@ pub(super) fn snapped_step(step: f64, count: u32, slack: Slack) -> f64 {
         let round = numerator / denominator;
         let off_deg = (step - round).abs();
         let is_its_digits =
-            off_deg <= slack.digit_deg && 2.0 * slack.digit_deg * denominator < CHANCE;
+            off_deg <= slack.half_digit && 2.0 * slack.half_digit * denominator < CHANCE;
         let is_open = is_its_digits || off_deg * f64::from(count) <= slack.drift_deg;
         // Over the whole axis the round step may not drift by more than this.
         if numerator >= 1.0 && is_open && (step / round - 1.0).abs() * f64::from(count) < SNAP_CELLS
