@@ -59,6 +59,11 @@ impl ObjectKey {
         Self(format!("manifest-pages/{product}/{sha256}.json"))
     }
 
+    /// The pin of a version: that clean-up leaves the manifest of this number and what it names.
+    pub fn pin(product: &ProductId, number: u64) -> Self {
+        Self(format!("pins/{product}/{number:010}.json"))
+    }
+
     /// Areas of a region's share of every cell, named by grid, region and earth.
     pub fn weights(job: &Digest) -> Self {
         Self(format!("weights/{job}.parquet"))
@@ -149,6 +154,7 @@ mod tests {
             ObjectKey::domain(&product, &digest),
             ObjectKey::manifest(&product, 7),
             ObjectKey::manifest_page(&product, &digest),
+            ObjectKey::pin(&product, 7),
             ObjectKey::weights(&digest),
             ObjectKey::observations(&product, &digest),
             ObjectKey::check(&digest),

@@ -20,6 +20,8 @@ pub enum Kind {
     Manifest,
     /// Steps of manifests, where there are many.
     ManifestPage,
+    /// A version that is kept until somebody releases it.
+    Pin,
     /// A region's share of every cell.
     Weights,
     /// Sums over a region, of every step of a version.
@@ -59,7 +61,7 @@ pub enum Vouched {
 
 impl Kind {
     /// All of them.
-    pub const ALL: [Self; 19] = [
+    pub const ALL: [Self; 20] = [
         Self::Raw,
         Self::Field,
         Self::Contributed,
@@ -67,6 +69,7 @@ impl Kind {
         Self::Domain,
         Self::Manifest,
         Self::ManifestPage,
+        Self::Pin,
         Self::Weights,
         Self::Sums,
         Self::Cube,
@@ -91,6 +94,7 @@ impl Kind {
             Self::Domain => "domain",
             Self::Manifest => "manifests",
             Self::ManifestPage => "manifest-pages",
+            Self::Pin => "pins",
             Self::Weights => "weights",
             Self::Sums => "sums",
             Self::Cube => "cubes",
@@ -145,7 +149,8 @@ mod tests {
             Kind::Series => Some(Kind::Domain),
             Kind::Domain => Some(Kind::Manifest),
             Kind::Manifest => Some(Kind::ManifestPage),
-            Kind::ManifestPage => Some(Kind::Weights),
+            Kind::ManifestPage => Some(Kind::Pin),
+            Kind::Pin => Some(Kind::Weights),
             Kind::Weights => Some(Kind::Sums),
             Kind::Sums => Some(Kind::Cube),
             Kind::Cube => Some(Kind::Accumulating),
@@ -201,6 +206,7 @@ mod tests {
                 Kind::ManifestPage,
                 Vouched::Nothing,
             ),
+            (ObjectKey::pin(&product, 7), Kind::Pin, Vouched::Nothing),
             (ObjectKey::weights(&digest), Kind::Weights, Vouched::Nothing),
             (ObjectKey::check(&digest), Kind::Check, Vouched::Nothing),
             (ObjectKey::tile(&digest), Kind::Tile, Vouched::Nothing),

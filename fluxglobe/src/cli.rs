@@ -59,7 +59,7 @@ pub(crate) use show::settings as shown_settings;
 pub(crate) use sql::{SqlFormat, SqlQuestion};
 pub(crate) use statistics::{Stats, StatsLine, StatsPoint, StatsPolygon};
 pub(crate) use surroundings::Surroundings;
-pub(crate) use upkeep::{Gc, Migrate, Recompute, RecomputeWhat, Survey, Verify};
+pub(crate) use upkeep::{Gc, Keep, Migrate, Recompute, RecomputeWhat, Survey, Verify};
 
 /// See and count the ocean's carbon.
 ///
@@ -213,6 +213,8 @@ pub(crate) enum Command {
     Migrate(Migrate),
     /// Remove objects that no kept version needs.
     Gc(Gc),
+    /// Pin a version that is cited: `gc` leaves it until it is released.
+    Keep(Keep),
     /// Show what would become of files: landed with which profile, or refused and why. Nothing is stored. Fails where nothing would land.
     Survey(Survey),
     /// List the Vulkan adapters of this machine, and which of them are drawn on.
@@ -554,6 +556,35 @@ mod tests {
         ] {
             let refused = Cli::try_parse_from(words.split(' ')).unwrap_err();
             assert!(refused.to_string().contains(said), "{refused}");
+        }
+    }
+
+    #[test]
+    fn a_version_is_pinned_or_released_or_all_are_listed() {
+        let parse = |words: &str| {
+            let words = format!("fluxglobe keep {words}");
+            let words: Vec<&str> = words.split_whitespace().collect();
+            Cli::try_parse_from(words).map_err(|refused| refused.to_string())
+        };
+        for words in [
+            "p@12",
+            "p@12-0a1b2c3d --because cited",
+            "--list",
+            "--list --json",
+            "--release p@12",
+        ] {
+            assert!(parse(words).is_ok(), "{words}");
+        }
+        let long = format!("p@12 --because {}", "a".repeat(501));
+        for (words, said) in [
+            ("", "PRODUCT@NUMBER"),
+            ("p@12 --list", "--list"),
+            ("p@12 --release p@13", "--release"),
+            ("p@x", "NAME@12"),
+            (long.as_str(), "500 characters"),
+        ] {
+            let refused = parse(words).unwrap_err();
+            assert!(refused.contains(said), "{refused}");
         }
     }
 

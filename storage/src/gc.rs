@@ -1,7 +1,7 @@
 //! Clean-up: objects that are in nobody's use and old enough to be in nobody's hands.
 //!
-//! What is in use is said by those who lay it out ([`Owner`]); this module knows no folder. Nothing is removed of a kind
-//! that no owner speaks for. Half-written files of killed writers go when no writer can be at them any more.
+//! What is in use is said by those who lay it out ([`Owner`]); this module knows no folder. Versions that are pinned are kept
+//! as the newest are. Nothing is removed of a kind that no owner speaks for. Half-written files of killed writers go when no writer can be at them any more.
 
 mod owner;
 mod versions;
@@ -18,7 +18,7 @@ use object_store::path::Path;
 use serde::Serialize;
 
 use crate::store::{Leftover, PROBES};
-use crate::{StorageError, Store};
+use crate::{StorageError, Store, pins};
 
 pub use owner::{Kept, LEAST_AGE, Owner};
 pub use versions::{Pictures, Versions};
@@ -54,6 +54,8 @@ pub struct GcPlan {
     pub leftovers: Vec<Leftover>,
     /// Objects that were looked at and stay.
     pub kept_count: usize,
+    /// Versions that are there and would not be kept if they were not pinned, but for their age.
+    pub only_pinned_count: usize,
 }
 
 impl GcPlan {
@@ -105,6 +107,7 @@ impl GcPlan {
 struct InUse<'a> {
     owners: &'a [&'a dyn Owner],
     keys: BTreeSet<ObjectKey>,
+    only_pinned_count: usize,
 }
 
 impl<'a> InUse<'a> {
@@ -118,7 +121,11 @@ impl<'a> InUse<'a> {
         for owner in owners {
             keys.append(&mut owner.in_use(store, &kept).await?);
         }
-        Ok(Self { owners, keys })
+        Ok(Self {
+            owners,
+            keys,
+            only_pinned_count: kept.only_pinned_count,
+        })
     }
 
     fn holds(&self, key: &ObjectKey) -> bool {
@@ -133,7 +140,7 @@ impl<'a> InUse<'a> {
 /// What clean-up at an instant would remove. Nothing is changed.
 ///
 /// # Errors
-/// A store that does not answer, and a list that cannot be read: it names things that nobody knows.
+/// A store that does not answer, and a list or a pin that cannot be read: it names things that nobody knows.
 pub async fn plan(
     store: &Store,
     owners: &[&dyn Owner],
@@ -141,7 +148,10 @@ pub async fn plan(
     now: TimeMs,
 ) -> Result<GcPlan, StorageError> {
     let in_use = InUse::read(store, owners, keep).await?;
-    let mut plan = GcPlan::default();
+    let mut plan = GcPlan {
+        only_pinned_count: in_use.only_pinned_count,
+        ..GcPlan::default()
+    };
     let mut kinds: Vec<(Kind, Duration)> = owners
         .iter()
         .flat_map(|owner| owner.kinds().iter().map(|kind| (*kind, owner.least_age())))
@@ -166,7 +176,7 @@ pub async fn plan(
 /// Returns how many objects and half-written files were removed. A run that was killed is resumed by planning again.
 ///
 /// # Errors
-/// As [`plan`]; and what was put to use by a new version while it was removed, by name.
+/// As [`plan`]; and what was put to use by a new version or a pin while it was removed, by name.
 pub async fn run(
     store: &Store,
     owners: &[&dyn Owner],
@@ -174,9 +184,13 @@ pub async fn run(
     keep: Keep,
     progress: &(dyn Fn(usize) + Send + Sync),
 ) -> Result<usize, StorageError> {
-    let in_use = InUse::read(store, owners, keep).await?;
+    let mut in_use = InUse::read(store, owners, keep).await?;
     let mut removed = BTreeSet::new();
     for (index, garbage) in plan.garbage.iter().enumerate() {
+        // Where somebody has pinned a version since, what it names, which comes later, stays with it.
+        if !in_use.holds(&garbage.key) && pins::holds(store, &garbage.key).await? {
+            in_use = InUse::read(store, owners, keep).await?;
+        }
         if !in_use.holds(&garbage.key) {
             store.remove(&garbage.key).await?;
             removed.insert(&garbage.key);
@@ -209,7 +223,7 @@ pub async fn run(
     } else {
         Err(StorageError::Damaged {
             object: lost.join(", "),
-            reason: "a new version came to use it while it was removed; ingest or derive it again"
+            reason: "a new version or a pin came to use it while it was removed; ingest or derive it again"
                 .to_owned(),
         })
     }

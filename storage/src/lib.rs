@@ -18,6 +18,7 @@ pub mod log;
 pub mod manifests;
 mod off_thread;
 mod parquet_table;
+pub mod pins;
 pub mod refusal;
 pub mod row_check;
 pub mod rows;

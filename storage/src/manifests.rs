@@ -30,7 +30,7 @@ pub async fn products(store: &Store) -> Result<Vec<ProductId>, StorageError> {
 
 /// The newest manifest of a product, if it has one.
 ///
-/// Where this process has seen one before, the next number is asked for and nothing is listed.
+/// Where this process has seen one a short while ago, the next number is asked for and nothing is listed.
 pub async fn latest(store: &Store, product: &ProductId) -> Result<Option<Manifest>, StorageError> {
     if let Some(known) = store.newest.get(product) {
         let newest = follow(store, product, known).await?;
@@ -48,7 +48,8 @@ pub async fn latest(store: &Store, product: &ProductId) -> Result<Option<Manifes
     numbered(store, product, newest).await
 }
 
-/// The newest manifest of a product if it is newer than the number that the caller knows: one small request where it is not.
+/// The newest manifest of a product if it is newer than the number that the caller knows: one small request where it is not and
+/// was looked for a short while ago.
 ///
 /// That the one it knows is still there is not asked; see [`is_there`].
 pub async fn newer(
@@ -56,11 +57,15 @@ pub async fn newer(
     product: &ProductId,
     known: u64,
 ) -> Result<Option<Manifest>, StorageError> {
-    let newest = follow(store, product, known).await?;
+    let newest = match store.newest.get(product) {
+        Some(seen) => follow(store, product, known.max(seen)).await?,
+        // Of those that followed it some may be gone.
+        None => last(store, product, known).await?,
+    };
+    store.newest.insert(product.clone(), newest);
     if newest == known {
         return Ok(None);
     }
-    store.newest.insert(product.clone(), newest);
     numbered(store, product, newest).await
 }
 
@@ -80,6 +85,11 @@ async fn follow(store: &Store, product: &ProductId, known: u64) -> Result<u64, S
             return Ok(newest);
         }
     }
+    last(store, product, known).await
+}
+
+/// The last number that is there; the known one where none is newer.
+async fn last(store: &Store, product: &ProductId, known: u64) -> Result<u64, StorageError> {
     let last = numbers(store, product).await?.pop();
     Ok(last.map_or(known, |last| last.max(known)))
 }
@@ -386,6 +396,28 @@ mod tests {
                 .unwrap();
         }
         assert_eq!(newest().await, Some(4));
+    }
+
+    /// An old version that is pinned stays while those after it go.
+    #[tokio::test]
+    async fn the_newest_is_found_behind_versions_that_are_gone() {
+        let store = Store::memory();
+        let product: ProductId = "p".parse().unwrap();
+        for number in [1, 4] {
+            commit(&store, &manifest(number, "t")).await.unwrap();
+        }
+        let found = async |known| {
+            let found = newer(&store, &product, known).await.unwrap();
+            found.map(|it| it.number)
+        };
+        assert_eq!(found(1).await, Some(4));
+        // By what was seen just now, and again once that is long ago.
+        assert_eq!(found(1).await, Some(4));
+        store.newest.remove(&product);
+        assert_eq!(found(1).await, Some(4));
+        assert_eq!(found(4).await, None);
+        commit(&store, &manifest(5, "t")).await.unwrap();
+        assert_eq!(found(4).await, Some(5));
     }
 
     #[tokio::test]

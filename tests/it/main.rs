@@ -21,6 +21,7 @@ mod interop;
 mod logged;
 mod masks;
 mod migrate;
+mod pinned;
 mod quality;
 mod recipe;
 mod reread;

@@ -193,6 +193,7 @@ impl Catalogue {
             AtInstant::BeforeFirst(first) => {
                 Err(AsOf::before_first(product_id, instant, first).into())
             }
+            AtInstant::Gone(older) => Err(AsOf::gone(product_id, instant, older).into()),
             AtInstant::Nothing => Err(unknown()),
         }
     }

@@ -165,6 +165,12 @@ pub fn history<'a>(
         if skipped > 0 {
             notes.push(format!("the {skipped} oldest versions were not looked at"));
         }
+        if published.windows(2).any(|pair| pair[1].0 != pair[0].0 + 1) {
+            notes.push(
+                "versions between those that are kept are gone: what they changed is told with the next one that is kept"
+                    .to_owned(),
+            );
+        }
         let (mut versions, mut before) = (vec![], None);
         for (number, at) in published.into_iter().skip(skipped) {
             // Clean-up may have taken it meanwhile.

@@ -4,6 +4,7 @@ use compute::budget::{budget_of, history};
 use compute::{Engine, ErrorClass, derive_accumulated};
 use contract::budget::{AskedRiver, BudgetQuery, ErrorWords};
 use contract::grid::Grid;
+use contract::key::ObjectKey;
 use contract::quantity::Quantity;
 use contract::time::{Period, TimeMs, TimeStep};
 use storage::Store;
@@ -166,6 +167,19 @@ async fn a_version_is_found_by_when_it_was_published() {
         }
     }
     assert_eq!(at(first.ms() - 1).await, AtInstant::BeforeFirst(first));
+    // Once the second is gone and the first is kept, nobody knows which of them was the newest after the first.
+    tokio::time::sleep(std::time::Duration::from_millis(20)).await;
+    publish(&store, &[(1, 3e-9)]).await;
+    store.remove(&ObjectKey::manifest(&id, 2)).await.unwrap();
+    for ms in [first.ms(), second.ms()] {
+        assert_eq!(at(ms).await, AtInstant::Gone(1));
+    }
+    let third = manifests::published(&store, &id).await.unwrap()[1].1;
+    assert!(matches!(at(third.ms()).await, AtInstant::Version(own) if own.number == 3));
+    let engine = Engine::local(store.clone());
+    let found = history(&engine, &total(&id, "global")).await.unwrap();
+    let notes = found.notes.join("; ");
+    assert!(notes.contains("versions between"), "{notes}");
     let nothing = manifests::as_of(&store, &product("none"), first)
         .await
         .unwrap();

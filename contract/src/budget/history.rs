@@ -41,6 +41,14 @@ impl AsOf {
             format!("the first version of {product} that is kept was published at {first}");
         ContractError::invalid("version as of", &instant.to_string(), reason)
     }
+
+    /// What is said where the version of then is gone, and an older one, of this number, is kept.
+    pub fn gone(product: &ProductId, instant: TimeMs, older: u64) -> ContractError {
+        let reason = format!(
+            "the version of {product} of then is not kept any more; of those before it version {older} is, and may be asked for by its number"
+        );
+        ContractError::invalid("version as of", &instant.to_string(), reason)
+    }
 }
 
 /// The same budget by the versions of a product that changed it.

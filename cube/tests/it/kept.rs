@@ -11,6 +11,7 @@ use contract::time::TimeMs;
 use cube::{At, CubeError, Repository, clean_up, follow, verify};
 use futures::FutureExt as _;
 use storage::gc::Keep;
+use storage::pins::{self, Pinned};
 use storage::verify::Fault;
 use storage::{Store, manifests};
 
@@ -94,6 +95,39 @@ async fn versions_that_are_not_kept_go_with_what_they_alone_need_and_the_others_
         let again = clean_up::run(&store, keep(1), in_hours(0), false).await;
         assert!(again.unwrap()[0].is_nothing());
     }
+}
+
+#[tokio::test]
+async fn a_version_that_is_pinned_keeps_its_name_and_what_it_needs_until_it_is_released() {
+    let store = Store::memory();
+    let versions = three_versions(&store).await;
+    let product = "p".parse().unwrap();
+    // What is pinned is all there.
+    let domain = &versions[0].domain;
+    store.put_new(domain, "".into()).await.unwrap();
+    let pinned = pins::pin(&store, &versions[0], None, in_hours(0)).await;
+    assert_eq!(pinned.unwrap(), Pinned::Now);
+    let keep = Keep {
+        versions: 1,
+        age: Duration::ZERO,
+    };
+    let looked = clean_up::run(&store, keep, in_hours(2), true).await;
+    assert_eq!(looked.unwrap()[0].versions, ["2"]);
+    store
+        .remove(&ObjectKey::manifest(&product, 2))
+        .await
+        .unwrap();
+    let cleaned = clean_up::run(&store, keep, in_hours(2), false).await;
+    assert_eq!(cleaned.unwrap()[0].versions, ["2"]);
+    let first = At::Version("1".to_owned());
+    holds(&store, first, &versions[0], &[(1, 1)]).await;
+    assert!(pins::release(&store, &product, 1).await.unwrap());
+    store
+        .remove(&ObjectKey::manifest(&product, 1))
+        .await
+        .unwrap();
+    let cleaned = clean_up::run(&store, keep, in_hours(2), false).await;
+    assert_eq!(cleaned.unwrap()[0].versions, ["1"]);
 }
 
 #[tokio::test]

@@ -1,12 +1,14 @@
-//! Words of what maintainers do: recompute, verify, remove, survey.
+//! Words of what maintainers do: recompute, verify, remove, keep, survey.
 
 use std::num::NonZeroU16;
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use compute::recompute::What;
+use contract::manifest::AskedVersion;
 use contract::product::ProductId;
 use contract::time::TimeMs;
+use storage::pins;
 
 /// What is recomputed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -142,7 +144,7 @@ pub(crate) struct Migrate {
 /// `fluxglobe gc`.
 #[derive(Debug, Args)]
 pub(crate) struct Gc {
-    /// Newest versions of each product that stay readable.
+    /// Newest versions of each product that stay readable. Those that `fluxglobe keep` pins stay besides.
     #[arg(long, default_value = "10", value_parser = kept_versions)]
     pub(crate) keep_versions: NonZeroU16,
     /// Whatever was written in the last days stays, and of the last hour in any case.
@@ -151,6 +153,35 @@ pub(crate) struct Gc {
     /// List and remove nothing.
     #[arg(long)]
     pub(crate) dry_run: bool,
+}
+
+/// `fluxglobe keep`.
+#[derive(Debug, Args)]
+#[command(after_long_help = "\
+What is published from a version, and cites it as NAME@12-0a1b2c3d, is answered as then for as long as that version is there: `fluxglobe gc`
+leaves those that are pinned, with all that they name, and what they were made from, until they are released. A pin lies in the store
+(pins/), for whoever cleans up. Of an attached product what lies elsewhere is kept by those who keep that store.
+
+Examples:
+  fluxglobe keep takahashi09-flux@12-0a1b2c3d --because 'Table 2 of the report'
+  fluxglobe keep --list
+  fluxglobe keep --release takahashi09-flux@12")]
+pub(crate) struct Keep {
+    /// Version to pin: NAME@12, or NAME@12-0a1b2c3d as it is cited, which it must be.
+    #[arg(value_name = "PRODUCT@NUMBER", required_unless_present_any = ["list", "release"])]
+    pub(crate) asked: Option<AskedVersion>,
+    /// Why, for those who find the pin: a line of at most 500 characters.
+    #[arg(long, value_name = "TEXT", requires = "asked", value_parser = pins::reason)]
+    pub(crate) because: Option<String>,
+    /// List what is pinned, since when and why, and which of it is not there all the same.
+    #[arg(long, conflicts_with_all = ["asked", "release"])]
+    pub(crate) list: bool,
+    /// The list as JSON.
+    #[arg(long, requires = "list")]
+    pub(crate) json: bool,
+    /// Release a version: it goes as others do.
+    #[arg(long, value_name = "PRODUCT@NUMBER", conflicts_with = "asked")]
+    pub(crate) release: Option<AskedVersion>,
 }
 
 /// How many versions stay.

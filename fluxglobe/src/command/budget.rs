@@ -79,6 +79,7 @@ async fn version(settings: &Settings, store: &Store, options: &Budget) -> Result
             AtInstant::BeforeFirst(first) => {
                 Err(AsOf::before_first(product, *instant, first).into())
             }
+            AtInstant::Gone(older) => Err(AsOf::gone(product, *instant, older).into()),
             AtInstant::Nothing => bail!("{product} has no version"),
         },
     }

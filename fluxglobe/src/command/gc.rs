@@ -15,7 +15,7 @@ use crate::command::notice;
 use crate::{deployment, progress};
 
 /// Everybody who lays out objects that clean-up may remove, but for cubes, whose library knows what is in use. Never removed are weights (what they were made from is in
-/// their name alone), notes of files of observations, and what all services agree on.
+/// their name alone), pins, notes of files of observations, and what all services agree on.
 const OWNERS: [&dyn Owner; 6] = [
     &Versions,
     &Pictures,
@@ -39,6 +39,12 @@ pub(crate) async fn run(settings: &Settings, options: &Gc) -> Result<()> {
         progress::result(&format!("{} {}", leftover.path, leftover.size_bytes))?;
     }
     say_attached(&store).await?;
+    if plan.only_pinned_count > 0 {
+        progress::say(&format!(
+            "{} versions are kept since they are pinned: `fluxglobe keep --list`",
+            plan.only_pinned_count
+        ));
+    }
     let summary = format!(
         "{} objects, {} half-written files, {:.1} MB; {} stay",
         plan.garbage.len(),
@@ -116,8 +122,10 @@ mod tests {
     fn every_kind_of_object_has_one_owner_or_is_never_removed() {
         for kind in Kind::ALL {
             let owners = OWNERS.iter().filter(|owner| owner.kinds().contains(&kind));
-            let is_kept_for_ever =
-                matches!(kind, Kind::Weights | Kind::ObservationFile | Kind::Protocol);
+            let is_kept_for_ever = matches!(
+                kind,
+                Kind::Pin | Kind::Weights | Kind::ObservationFile | Kind::Protocol
+            );
             let is_owned = !is_kept_for_ever && kind != Kind::Cube;
             assert_eq!(owners.count(), usize::from(is_owned), "{kind:?}");
         }

@@ -14,6 +14,7 @@ mod gc;
 pub(crate) mod generate;
 mod geometry;
 mod ingest;
+mod keep;
 mod legend;
 mod migrate;
 pub(crate) mod notice;
@@ -79,6 +80,7 @@ pub(crate) async fn run(settings: &Settings, command: Command) -> Result<ExitCod
         Command::Verify(options) => return verify::run(settings, &options).await,
         Command::Migrate(options) => return Box::pin(migrate::run(settings, &options)).await,
         Command::Gc(options) => gc::run(settings, &options).await?,
+        Command::Keep(options) => keep::run(settings, &options).await?,
         Command::Bench(bench) => measure(settings, bench).await?,
         Command::Adapters(options) => adapters::run(settings, &options)?,
         Command::Generate(options) => generate::run(options)?,

@@ -168,6 +168,12 @@ fn advice(report: &Report) -> Vec<String> {
             note.key
         ));
     }
+    if let Some(pin) = found(&[Kind::Pin]) {
+        advice.push(format!(
+            "{} keeps a version that somebody cites: `fluxglobe gc` removes nothing until it is released (fluxglobe keep --release PRODUCT@NUMBER), and pinned again if that is still so",
+            pin.key
+        ));
+    }
     if let Some(series) = found(&[Kind::Series]) {
         advice.push(format!(
             "{} was written by a program of before and is read by nobody: `fluxglobe gc` removes it",
@@ -231,6 +237,7 @@ mod tests {
             ("cubes/p/repo", "recompute"),
             ("raw/p/a", "ingest it again"),
             ("manifests/p/1.json", "restore"),
+            ("pins/p/0000000001.json", "keep --release"),
             ("weights/a.parquet", "when they are next needed"),
         ] {
             let advice = advice(&report(key)).join("; ");

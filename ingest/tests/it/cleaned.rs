@@ -78,6 +78,8 @@ async fn what_references_that_cannot_be_read_refer_to_stays() {
     let kept = Kept {
         manifests: vec![version],
         versions: 1,
+        pinned: vec![],
+        only_pinned_count: 0,
     };
     let in_use = Versions.in_use(&own.store, &kept).await.unwrap();
     assert!(in_use.contains(&attachment));

@@ -6,9 +6,9 @@ use std::time::Duration;
 use async_trait::async_trait;
 use contract::key::ObjectKey;
 use contract::kind::Kind;
-use contract::manifest::Manifest;
+use contract::manifest::{Manifest, ManifestId};
 
-use crate::{StorageError, Store, manifests};
+use crate::{StorageError, Store, manifests, pins};
 
 /// The youngest age that may be removed: whoever is writing has long been done.
 pub const LEAST_AGE: Duration = Duration::from_hours(1);
@@ -50,24 +50,35 @@ pub trait Owner: Send + Sync {
 /// The versions that are kept.
 #[derive(Debug)]
 pub struct Kept {
-    /// The newest versions of every product and, so that they stay readable, those that they were derived from.
+    /// The newest versions of every product, those that are pinned and, so that they stay readable, those that they were derived from.
     pub manifests: Vec<Manifest>,
     /// How many of the newest are kept of every numbered list, at least one.
     pub versions: usize,
+    /// Versions that are pinned, whether they are there or not.
+    pub pinned: Vec<ManifestId>,
+    /// How many of these are there and would not be kept for being new.
+    pub only_pinned_count: usize,
 }
 
 impl Kept {
-    /// The newest versions of all products, so many of each.
+    /// The newest versions of all products, so many of each, and those that are pinned.
+    ///
+    /// # Errors
+    /// A store that does not answer; a pin or a manifest that cannot be read.
     pub async fn read(store: &Store, versions: usize) -> Result<Self, StorageError> {
-        let mut kept = vec![];
-        // A list that cannot be read names things that nobody knows: nothing may be removed.
+        let (mut kept, mut only_pinned_count) = (vec![], 0);
+        // A pin or a list that cannot be read names things that nobody knows: nothing may be removed.
+        let pins = pins::all(store).await?;
+        let pinned: Vec<ManifestId> = pins.into_iter().map(|pin| pin.version).collect();
         for product in manifests::products(store).await? {
-            for number in manifests::numbers(store, &product)
-                .await?
-                .into_iter()
-                .rev()
-                .take(versions)
-            {
+            let there = manifests::numbers(store, &product).await?;
+            let newest = there.iter().rev().take(versions);
+            let mut numbers: BTreeSet<u64> = newest.copied().collect();
+            for pin in pinned.iter().filter(|pin| pin.product == product) {
+                let is_old = numbers.insert(pin.number);
+                only_pinned_count += usize::from(is_old && there.contains(&pin.number));
+            }
+            for number in numbers.into_iter().rev() {
                 let Some(manifest) = manifests::numbered(store, &product, number).await? else {
                     continue;
                 };
@@ -83,6 +94,8 @@ impl Kept {
         Ok(Self {
             manifests,
             versions,
+            pinned,
+            only_pinned_count,
         })
     }
 }

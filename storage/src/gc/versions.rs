@@ -33,7 +33,10 @@ impl Owner for Versions {
         store: &Store,
         kept: &Kept,
     ) -> Result<BTreeSet<ObjectKey>, StorageError> {
-        let mut keys = BTreeSet::new();
+        // Of one that is pinned the manifest is in use even where it is gone: whoever has just removed it is to know.
+        let pinned = kept.pinned.iter();
+        let pinned = pinned.map(|pin| ObjectKey::manifest(&pin.product, pin.number));
+        let mut keys: BTreeSet<ObjectKey> = pinned.collect();
         for manifest in &kept.manifests {
             keys.extend(attachments(store, manifest).await?);
             let product = &manifest.product;

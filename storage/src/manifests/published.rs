@@ -15,6 +15,8 @@ pub enum AtInstant {
     Version(Box<Manifest>),
     /// The first that is kept was published later.
     BeforeFirst(TimeMs),
+    /// Clean-up has taken it: the last one that is kept of those before it.
+    Gone(u64),
     /// It has none.
     Nothing,
 }
@@ -42,11 +44,17 @@ pub async fn as_of(
     instant: TimeMs,
 ) -> Result<AtInstant, StorageError> {
     let all = published(store, product).await?;
-    for (number, _) in all.iter().rev().filter(|(_, written)| *written <= instant) {
-        // Clean-up may have taken it meanwhile.
-        if let Some(manifest) = numbered(store, product, *number).await? {
-            return Ok(AtInstant::Version(Box::new(manifest)));
-        }
+    let newest = all.iter().rposition(|(_, written)| *written <= instant);
+    if let Some(at) = newest {
+        let (number, _) = all[at];
+        // Where those that follow it are gone, the newest of then may have been one of them: it is there for being pinned, or for what was
+        // made of it.
+        let is_known = all.get(at + 1).is_none_or(|(next, _)| *next == number + 1);
+        return Ok(match numbered(store, product, number).await? {
+            Some(manifest) if is_known => AtInstant::Version(Box::new(manifest)),
+            // Clean-up may have taken it meanwhile.
+            _ => AtInstant::Gone(number),
+        });
     }
     Ok(match all.iter().map(|(_, written)| *written).min() {
         Some(first) => AtInstant::BeforeFirst(first),

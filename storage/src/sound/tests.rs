@@ -94,6 +94,7 @@ async fn put_others(store: &Store, product: &ProductId, raw_sha256: Digest, peri
         "checks/a.json",
         "observation-indexes/p/1.json",
         "manifest-pages/p/a.json",
+        "pins/p/0000000001.json",
         "protocol/current.json",
     ] {
         let document = serde_json::json!({"schema": 2, "name": name});

@@ -19,8 +19,9 @@ use contract::masked::MaskedCells;
 use contract::notice::NoticeRun;
 use contract::product::ProductId;
 use contract::quantity::Quantity;
-use contract::time::Period;
+use contract::time::{Period, TimeMs};
 use storage::contributed::{self, Contributed};
+use storage::pins::{self, Pinned};
 use storage::{Store, document, domain, fields, manifests, verify, weights};
 
 const ROWS: u32 = 61;
@@ -214,12 +215,24 @@ async fn write(store: &Store) -> Manifest {
         notices: vec![],
     };
     manifests::commit(store, &manifest).await.unwrap();
+    let because = Some(BECAUSE.to_owned());
+    let pinned = pins::pin(store, &manifest, because, pinned_at()).await;
+    // Over what is frozen by the commands before, it was.
+    assert!(!matches!(pinned.unwrap(), Pinned::Not(_)));
     contributed::write(store, &product(), &GRID, &counts())
         .await
         .unwrap();
     let manifest = revised(manifest);
     manifests::commit(store, &manifest).await.unwrap();
     manifest
+}
+
+/// Why the first version is kept.
+const BECAUSE: &str = "Table 2 of a paper that nobody wrote";
+
+/// When it was pinned.
+fn pinned_at() -> TimeMs {
+    "2001-03-03T00:00:00Z".parse().unwrap()
 }
 
 /// The next version, with all that a version may say.
@@ -260,6 +273,7 @@ async fn own(store: &Store) -> Vec<ObjectKey> {
         Kind::Domain,
         Kind::Contributed,
         Kind::Manifest,
+        Kind::Pin,
     ] {
         let folder = format!("{}/{}", kind.folder(), product());
         keys.extend(store.list(&folder).await.unwrap());
@@ -280,6 +294,8 @@ async fn what_is_written_now_is_named_as_in_the_newest_frozen_store() {
     let newest = manifests::latest(&kept, &product()).await.unwrap();
     assert_eq!(newest.unwrap(), manifest);
     assert_eq!(own(&kept).await, own(&now).await);
+    let pinned = pins::all(&kept).await.unwrap();
+    assert_eq!(pinned, pins::all(&now).await.unwrap());
     let job = ObjectKey::weights(&Digest::of(b"a region"));
     let both = (
         weights::read(&kept, &job).await.unwrap(),
@@ -328,6 +344,20 @@ async fn a_frozen_page_holds_the_steps_of_its_manifest() {
     let manifest = manifest.unwrap();
     assert_eq!((page.schema, page.steps), (PAGED_SCHEMA, manifest.steps));
     assert_eq!(page.notices, manifest.notices);
+}
+
+#[tokio::test]
+async fn a_frozen_pin_says_which_version_is_kept_and_why() {
+    let (_folder, store) = copy(2);
+    let all = pins::all(&store).await.unwrap();
+    let [pin] = &all[..] else {
+        panic!("one is frozen")
+    };
+    assert_eq!(pin.version.to_string(), "fgco2@1-429db3bf");
+    assert_eq!(pin.because.as_deref(), Some(BECAUSE));
+    assert_eq!(pin.since, pinned_at());
+    // The version is there, by the name that it was pinned under.
+    assert_eq!(pins::lacking(&store, &pin.version).await.unwrap(), None);
 }
 
 #[tokio::test]

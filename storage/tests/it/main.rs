@@ -14,6 +14,7 @@ mod faults;
 mod frozen;
 mod killed;
 mod name_node;
+mod pinned;
 mod restarts;
 mod stores;
 mod suite;

@@ -50,6 +50,11 @@ fn reader(kind: Kind) -> Reader {
             "storage/tests/it/frozen.rs",
             "a_frozen_page_holds_the_steps_of_its_manifest",
         ),
+        // Versions could not be pinned before.
+        Kind::Pin => since_2(
+            "storage/tests/it/frozen.rs",
+            "a_frozen_pin_says_which_version_is_kept_and_why",
+        ),
         // Cubes were exported only, never in a store, before.
         Kind::Cube => since_2(
             "cube/tests/it/frozen.rs",
