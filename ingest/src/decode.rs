@@ -47,19 +47,6 @@ pub(crate) struct RawBand {
     is_good: Option<Vec<bool>>,
 }
 
-/// Reads and turns some rows of one step.
-pub(crate) async fn run(
-    plan: &mut Plan,
-    step: PlannedStep,
-    rows: Range<u32>,
-) -> Result<DecodedBand, Stop> {
-    let raw = read(plan, (step, rows), None).await?;
-    let conversion = Conversion::of(plan);
-    let band = conversion.band(raw)?;
-    conversion.tell(plan);
-    Ok(band)
-}
-
 /// Reads some rows of one step; what the reader is to give after them it is told before it is waited for.
 pub(crate) async fn read(
     plan: &mut Plan,

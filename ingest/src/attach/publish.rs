@@ -9,6 +9,7 @@ use contract::manifest::{MANIFEST_SCHEMA, Manifest, Step};
 use contract::product::ProductId;
 use contract::quantity::Quantity;
 use storage::attached::Attachment;
+use storage::domain::Cells;
 use storage::{StorageError, Store, domain, fields, manifests};
 
 use super::Attached;
@@ -91,7 +92,7 @@ pub(super) async fn publish(
         grid: plan.mapping.grid,
         only: (!replace).then_some(&attachment),
     };
-    let domain = is_all.then_some(&read.domain[..]);
+    let domain = is_all.then_some(&read.domain);
     let (version, is_new) = next_version(store, &next, (&read.steps, domain)).await?;
     Ok(Attached {
         is_new,
@@ -201,7 +202,7 @@ fn check_fits(
 async fn next_version(
     store: &Store,
     next: &Next<'_>,
-    (steps, domain): (&[Step], Option<&[bool]>),
+    (steps, domain): (&[Step], Option<&Cells>),
 ) -> Result<(Manifest, bool), Stop> {
     let mut pauses = commit::attempts();
     loop {
@@ -226,7 +227,7 @@ async fn next_version(
             }
         }
         let domain = match domain {
-            Some(cells) => domain::write(store, next.product, cells)
+            Some(cells) => domain::write_cells(store, next.product, cells.clone())
                 .await
                 .map_err(IngestError::storage("store the domain"))?,
             None => commit::domain(store, next.product, &grid, newest.as_ref(), steps).await?,
