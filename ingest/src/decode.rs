@@ -230,7 +230,7 @@ impl Slab {
     }
 
     /// What of each axis it is, and how many values.
-    fn parts(self, axes: &[Axis]) -> (Vec<Part>, u64) {
+    pub(crate) fn parts(self, axes: &[Axis]) -> (Vec<Part>, u64) {
         let part = axes.iter().map(|axis| self.part(axis)).collect();
         let lens = axes.iter().map(|axis| match axis.role {
             Role::Latitude => self.count,
@@ -250,10 +250,6 @@ impl Slab {
             Role::Other => Part::At(0),
         }
     }
-}
-
-pub(crate) fn is_plane(axis: &Axis) -> bool {
-    matches!(axis.role, Role::Latitude | Role::Longitude)
 }
 
 /// Is every cell of a part of the file's map good enough? None if nobody asks.

@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use contract::chunk::BAND_CELLS;
 use contract::event::RejectReason;
 use contract::grid::Grid;
 use contract::key::ObjectKey;
@@ -81,7 +82,7 @@ pub(super) async fn publish(
     let told_of_steps = left_out(&plan, &read.steps);
     plan.assumptions.extend(told_of_steps);
     // The way back, before anybody goes it: address, credentials and all that the attachment keeps.
-    let first = fields::read(store, &read.steps[0].field, &plan.mapping.grid).await;
+    let first = read_through(store, &read.steps[0].field, &plan.mapping.grid).await;
     first.map_err(IngestError::storage("read an attached step again"))?;
     let next = Next {
         product: &product,
@@ -106,6 +107,13 @@ pub(super) async fn publish(
         masked: read.masked,
         assumptions: plan.assumptions,
     })
+}
+
+/// Reads a field band by band, and compares it with its name.
+async fn read_through(store: &Store, field: &ObjectKey, grid: &Grid) -> Result<(), StorageError> {
+    let mut bands = fields::bands(store, field, grid, BAND_CELLS).await?;
+    while bands.next().await?.is_some() {}
+    Ok(())
 }
 
 /// The quantity with the range of its values; only open ones keep it.

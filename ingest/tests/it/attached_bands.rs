@@ -1,11 +1,15 @@
-//! Maps of stores of others that are read in bands of their chunks: the same steps as of maps in one band.
+//! Maps of stores of others that are read in bands of their chunks: the same steps as of maps in one band, and memory is that of
+//! the bands.
 
 use std::path::Path;
+use std::process::Command;
 
 use contract::manifest::Manifest;
 use serde_json::json;
+use storage::fields;
 
-use crate::attached::{Own, copy, fixture};
+use crate::attached::{Own, copy, fixture, request};
+use crate::bands::peak_bytes;
 
 /// Cells of a map of more than a band.
 const SMALL: [usize; 2] = [2900, 2900];
@@ -149,4 +153,51 @@ async fn maps_of_several_bands_are_those_of_one() {
         // The way back compares them with their name.
         assert!(own.values(&newest, 0).await.is_ok());
     }
+}
+
+/// Names the folder of the process that attaches a large map.
+const INNER: &str = "FLUXGLOBE_TEST_ATTACHES_IN";
+/// Cells of that map: 192 MB as they are stored, 384 MB as they come.
+const LARGE: [usize; 2] = [6000, 8000];
+/// What this process may take to attach it, and for a point of it.
+const OWN_BYTES: u64 = 480 << 20;
+
+/// Attaches the map of a folder and reads some rows of it, in a process that does nothing else, and fails if it takes too much.
+async fn attach_large(folder: &str) {
+    let (own, before) = (Own::new(), peak_bytes());
+    own.ask(&request(folder, "sst")).await.unwrap();
+    let newest = own.newest().await;
+    let field = &newest.steps[0].field;
+    let reader = fields::Reader::open(&own.store, field, Some(&newest.grid)).await;
+    let rows = reader.unwrap().rows(3000..3060).await.unwrap();
+    let wanted = value(stored(3000, 8));
+    assert!((f64::from(rows[8]) - wanted).abs() < 1e-4, "{}", rows[8]);
+    let taken = peak_bytes() - before;
+    eprintln!("{} MiB were taken", taken >> 20);
+    assert!(taken < OWN_BYTES, "{} MiB were taken", taken >> 20);
+}
+
+/// Runs itself in a process of its own, whose peak is that of this one map.
+#[tokio::test]
+async fn a_large_map_is_attached_and_read_within_the_memory_of_its_bands() {
+    if let Some(folder) = std::env::var_os(INNER) {
+        return attach_large(folder.to_str().unwrap()).await;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("other.zarr");
+    let lies = Lies {
+        chunk_rows: 100,
+        south_first: false,
+        lon_first: false,
+    };
+    write(&path, LARGE, lies);
+    let name = "attached_bands::a_large_map_is_attached_and_read_within_the_memory_of_its_bands";
+    let attached = Command::new(std::env::current_exe().unwrap())
+        .args(["--exact", name, "--nocapture"])
+        .env(INNER, &path)
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&attached.stderr);
+    assert!(attached.status.success(), "{said}");
+    assert!(said.contains("MiB were taken"), "it did not run: {said}");
 }
