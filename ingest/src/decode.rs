@@ -47,19 +47,6 @@ pub(crate) struct RawBand {
     is_good: Option<Vec<bool>>,
 }
 
-/// Reads and turns some rows of one step.
-pub(crate) async fn run(
-    plan: &mut Plan,
-    step: PlannedStep,
-    rows: Range<u32>,
-) -> Result<DecodedBand, Stop> {
-    let raw = read(plan, (step, rows), None).await?;
-    let conversion = Conversion::of(plan);
-    let band = conversion.band(raw)?;
-    conversion.tell(plan);
-    Ok(band)
-}
-
 /// Reads some rows of one step; what the reader is to give after them it is told before it is waited for.
 pub(crate) async fn read(
     plan: &mut Plan,
@@ -243,7 +230,7 @@ impl Slab {
     }
 
     /// What of each axis it is, and how many values.
-    fn parts(self, axes: &[Axis]) -> (Vec<Part>, u64) {
+    pub(crate) fn parts(self, axes: &[Axis]) -> (Vec<Part>, u64) {
         let part = axes.iter().map(|axis| self.part(axis)).collect();
         let lens = axes.iter().map(|axis| match axis.role {
             Role::Latitude => self.count,
@@ -263,10 +250,6 @@ impl Slab {
             Role::Other => Part::At(0),
         }
     }
-}
-
-pub(crate) fn is_plane(axis: &Axis) -> bool {
-    matches!(axis.role, Role::Latitude | Role::Longitude)
 }
 
 /// Is every cell of a part of the file's map good enough? None if nobody asks.

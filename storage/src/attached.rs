@@ -7,6 +7,7 @@
 //! (the caller's [`Source`]).
 
 mod attachment;
+mod field;
 mod layer;
 mod reference;
 mod source;

@@ -176,6 +176,19 @@ impl ForeignArray {
         Ok(all)
     }
 
+    /// First cells of its chunks along one of its dimensions, ascending; of shards those of shards, which are unpacked whole.
+    ///
+    /// # Errors
+    /// Its chunks have no shape, or it has no cells.
+    pub fn chunk_starts(&self, dimension: usize) -> Result<Vec<u64>, ForeignError> {
+        let own = self.dimensions.iter().enumerate();
+        let ends = own.map(|(at, (_, length))| if at == dimension { *length } else { 1 });
+        let part: Vec<Range<u64>> = ends.map(|end| 0..end).collect();
+        let chunks = self.chunks_of(&part)?;
+        let starts = chunks.iter().filter_map(|(_, cells)| cells.get(dimension));
+        Ok(starts.map(|cells| cells.start).collect())
+    }
+
     /// Bytes of a chunk once it is unpacked.
     ///
     /// # Errors

@@ -4,8 +4,8 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use futures::stream::{self, StreamExt as _, TryStreamExt as _};
-use quick_cache::Weighter;
-use quick_cache::sync::Cache;
+use quick_cache::sync::{Cache, DefaultLifecycle};
+use quick_cache::{DefaultHashBuilder, OptionsBuilder, Weighter};
 use zarrs::array::{
     ArrayShardedExt as _, ArrayToBytesCodecTraits as _, AsyncArrayShardedReadableExt as _,
     CodecOptions,
@@ -40,7 +40,16 @@ pub(super) struct Chunks(Cache<Key, Unpacked, BySize>);
 
 impl Default for Chunks {
     fn default() -> Self {
-        Self(Cache::with_weighter(KEPT_CHUNKS, KEPT_BYTES, BySize))
+        // One shard: in several, of which there are more the more processors there are, each would have a part of the room that a chunk
+        // may not fit into.
+        let options = OptionsBuilder::new()
+            .shards(1)
+            .estimated_items_capacity(KEPT_CHUNKS)
+            .weight_capacity(KEPT_BYTES)
+            .build()
+            .expect("both capacities are given");
+        let (hasher, lifecycle) = (DefaultHashBuilder::default(), DefaultLifecycle::default());
+        Self(Cache::with_options(options, BySize, hasher, lifecycle))
     }
 }
 
@@ -274,5 +283,22 @@ fn copy(
         for (to, from) in to.iter_mut().zip(from) {
             *to = number(kind, from).unwrap_or(f64::NAN);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_large_chunk_is_kept_whatever_the_number_of_processors() {
+        let chunks = Chunks::default();
+        let key = |col| ("sst".to_owned(), vec![0, col]);
+        for col in 0..2 {
+            let chunk = Arc::new(vec![0; 100 << 20]);
+            chunks.0.insert(key(col), Some(chunk));
+        }
+        assert!((0..2).all(|col| chunks.0.get(&key(col)).is_some()));
+        assert!(chunks.0.get(&key(2)).is_none());
     }
 }

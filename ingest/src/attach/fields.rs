@@ -1,5 +1,6 @@
 //! A reference in, the values that it refers to out: the way of the landing, from the plan that the attachment keeps.
 
+use std::ops::Range;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -11,9 +12,9 @@ use quick_cache::sync::Cache;
 use storage::attached::{Attachment, Cause, Failure, Reference, Source, StoreKind};
 
 use super::reading::Reading;
-use super::{address, moved};
+use super::{address, bands, moved};
 use crate::check::Found as FoundValues;
-use crate::decode::{DecodedBand, Slab, converted, is_plane};
+use crate::decode::{DecodedBand, Slab, converted};
 use crate::inspect::arrays::Arrays;
 use crate::limits::Limits;
 use crate::plan::PlannedStep;
@@ -77,24 +78,15 @@ impl ForeignFields {
         let opened = self.open.get_or_insert_async(&name, open).await;
         opened.map(|(foreign, _since)| foreign)
     }
-}
 
-#[async_trait]
-impl Source for ForeignFields {
-    async fn values(
+    /// How an attachment is read, and the arrays that it is read from.
+    async fn opened(
         &self,
-        attachment: &Arc<Attachment>,
-        reference: &Reference,
-    ) -> Result<Vec<f32>, Failure> {
-        let period = reference.period;
-        let place = || format!("{} step {period}", attachment.place());
-        let refused = |reason: String| Failure {
-            place: place(),
-            reason,
-            cause: Cause::Content,
-            folder: attachment.folder().map(str::to_owned),
-        };
-        let reading = Reading::of(attachment).map_err(refused)?;
+        attachment: &Attachment,
+        period: Period,
+    ) -> Result<(Reading, Arrays), Failure> {
+        let reading = Reading::of(attachment);
+        let reading = reading.map_err(|reason| refused(attachment, period, reason))?;
         let foreign = match self.foreign(attachment).await {
             Ok(foreign) => foreign,
             Err(error) => return Err(failed(error, attachment, period).await),
@@ -107,23 +99,62 @@ impl Source for ForeignFields {
         let plane_cells = Limits::default().plane_cells;
         let own = (attachment.array.clone(), absent);
         let arrays = Arrays::new(foreign, reading.indexes.clone(), own, plane_cells);
+        Ok((reading, arrays))
+    }
+}
+
+#[async_trait]
+impl Source for ForeignFields {
+    async fn bands(
+        &self,
+        attachment: &Arc<Attachment>,
+        reference: &Reference,
+    ) -> Result<Vec<Range<u32>>, Failure> {
+        let period = reference.period;
+        let (reading, arrays) = self.opened(attachment, period).await?;
+        let axis = bands::rows_axis(&reading.axes);
+        let starts = axis.map(|axis| arrays.chunk_starts(&attachment.array, axis));
+        match starts.transpose() {
+            Ok(starts) => Ok(bands::of(&reading.mapping, &starts.unwrap_or_default())),
+            Err(error) => Err(failed(error, attachment, period).await),
+        }
+    }
+
+    async fn values(
+        &self,
+        attachment: &Arc<Attachment>,
+        reference: &Reference,
+        rows: Range<u32>,
+    ) -> Result<Vec<f32>, Failure> {
+        let period = reference.period;
+        let refused = |reason: String| refused(attachment, period, reason);
+        let (reading, arrays) = self.opened(attachment, period).await?;
+        let row_count = reading.mapping.file_rows.len();
+        if rows.is_empty() || rows.end as usize > row_count {
+            let reason = format!(
+                "its attachment has {row_count} rows, and {} to {} are asked for",
+                rows.start, rows.end
+            );
+            return Err(refused(reason));
+        }
         let step = PlannedStep {
             period,
             time_index: reference.time_index,
             factor: f64::from_bits(reference.conversion[0]),
             offset: f64::from_bits(reference.conversion[1]),
         };
-        let rows = 0..reading.mapping.file_rows.len() as u32;
         let slab = Slab::of(&reading.mapping, step, &rows);
-        let parts: Vec<_> = reading.axes.iter().map(|axis| slab.part(axis)).collect();
+        let (parts, cells) = slab.parts(&reading.axes);
         let stored = match arrays.values(&attachment.array, &parts).await {
             Ok(stored) => stored,
             Err(error) => return Err(failed(error, attachment, period).await),
         };
-        let made = tokio::task::spawn_blocking(move || made(&reading, step, &stored));
-        made.await
-            .map_err(|e| refused(e.to_string()))?
-            .map_err(refused)
+        if cells != stored.len() as u64 || rows.len() as u64 > cells {
+            let reason = format!("{} values for {cells} cells", stored.len());
+            return Err(refused(reason));
+        }
+        let made = tokio::task::spawn_blocking(move || made(&reading, (step, rows), &stored));
+        made.await.map_err(|e| refused(e.to_string()))
     }
 
     async fn gone(&self, attachment: &Attachment, reference: &Reference) -> Option<Failure> {
@@ -136,6 +167,16 @@ impl Source for ForeignFields {
         let opened = self.open.get(&name);
         let is_old = opened.is_some_and(|(_foreign, since)| since.elapsed() > JUST_READ);
         is_old && self.open.remove(&name).is_some()
+    }
+}
+
+/// What is not read of a step though its store answers.
+fn refused(attachment: &Attachment, period: Period, reason: String) -> Failure {
+    Failure {
+        place: format!("{} step {period}", attachment.place()),
+        reason,
+        cause: Cause::Content,
+        folder: attachment.folder().map(str::to_owned),
     }
 }
 
@@ -172,8 +213,8 @@ fn of_step(error: ForeignError, attachment: &Attachment, period: Period) -> Fail
     }
 }
 
-/// Values of the grid from stored numbers, with what cannot be true masked as it was when they were attached.
-fn made(reading: &Reading, step: PlannedStep, stored: &[f64]) -> Result<Vec<f32>, String> {
+/// Values of some rows of the grid from stored numbers, with what cannot be true masked as it was when they were attached.
+fn made(reading: &Reading, of: (PlannedStep, Range<u32>), stored: &[f64]) -> Vec<f32> {
     let Reading {
         axes,
         mapping,
@@ -181,21 +222,13 @@ fn made(reading: &Reading, step: PlannedStep, stored: &[f64]) -> Result<Vec<f32>
         quantity,
         ..
     } = reading;
-    let plane = axes.iter().filter(|axis| is_plane(axis));
-    let cells: u64 = plane.map(|axis| axis.len).product();
-    let rows = mapping.file_rows.len() as u64;
-    if cells != stored.len() as u64 || rows > cells {
-        return Err(format!("{} values for {cells} cells", stored.len()));
-    }
     let mut masked = MaskedCells::default();
     let packing = Packing::from(packing);
-    let rows = 0..rows as u32;
-    let values = converted((axes, mapping), &packing, (step, rows), stored, &mut masked);
     let decoded = DecodedBand {
-        values,
+        values: converted((axes, mapping), &packing, of, stored, &mut masked),
         masked,
         // They were looked at when the store was attached.
         ends: Ends::default(),
     };
-    Ok(FoundValues::nothing().band(decoded, *quantity).0)
+    FoundValues::nothing().band(decoded, *quantity).0
 }

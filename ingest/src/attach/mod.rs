@@ -5,12 +5,13 @@
 //! Request
 //!   address   Objects      what may be read, read only
 //!   survey    Plan         what is read and what that becomes: as of a file (plan)
-//!   steps     NewStep      each decoded and checked as of a file, its digest taken, a reference stored
+//!   steps     NewStep      each decoded and checked as of a file, in bands of its chunks, its digest taken, a reference stored
 //!   publish   Manifest     names them
 //! ```
 //! What is read later goes the same way back ([`ForeignFields`]), and values that are not those of the digest never come out.
 
 mod address;
+mod bands;
 mod fields;
 mod kept;
 mod moved;

@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use contract::chunk::BAND_CELLS;
 use contract::event::RejectReason;
 use contract::grid::Grid;
 use contract::key::ObjectKey;
@@ -9,6 +10,7 @@ use contract::manifest::{MANIFEST_SCHEMA, Manifest, Step};
 use contract::product::ProductId;
 use contract::quantity::Quantity;
 use storage::attached::Attachment;
+use storage::domain::Cells;
 use storage::{StorageError, Store, domain, fields, manifests};
 
 use super::Attached;
@@ -80,7 +82,7 @@ pub(super) async fn publish(
     let told_of_steps = left_out(&plan, &read.steps);
     plan.assumptions.extend(told_of_steps);
     // The way back, before anybody goes it: address, credentials and all that the attachment keeps.
-    let first = fields::read(store, &read.steps[0].field, &plan.mapping.grid).await;
+    let first = read_through(store, &read.steps[0].field, &plan.mapping.grid).await;
     first.map_err(IngestError::storage("read an attached step again"))?;
     let next = Next {
         product: &product,
@@ -91,7 +93,7 @@ pub(super) async fn publish(
         grid: plan.mapping.grid,
         only: (!replace).then_some(&attachment),
     };
-    let domain = is_all.then_some(&read.domain[..]);
+    let domain = is_all.then_some(&read.domain);
     let (version, is_new) = next_version(store, &next, (&read.steps, domain)).await?;
     Ok(Attached {
         is_new,
@@ -105,6 +107,13 @@ pub(super) async fn publish(
         masked: read.masked,
         assumptions: plan.assumptions,
     })
+}
+
+/// Reads a field band by band, and compares it with its name.
+async fn read_through(store: &Store, field: &ObjectKey, grid: &Grid) -> Result<(), StorageError> {
+    let mut bands = fields::bands(store, field, grid, BAND_CELLS).await?;
+    while bands.next().await?.is_some() {}
+    Ok(())
 }
 
 /// The quantity with the range of its values; only open ones keep it.
@@ -201,7 +210,7 @@ fn check_fits(
 async fn next_version(
     store: &Store,
     next: &Next<'_>,
-    (steps, domain): (&[Step], Option<&[bool]>),
+    (steps, domain): (&[Step], Option<&Cells>),
 ) -> Result<(Manifest, bool), Stop> {
     let mut pauses = commit::attempts();
     loop {
@@ -226,7 +235,7 @@ async fn next_version(
             }
         }
         let domain = match domain {
-            Some(cells) => domain::write(store, next.product, cells)
+            Some(cells) => domain::write_cells(store, next.product, cells.clone())
                 .await
                 .map_err(IngestError::storage("store the domain"))?,
             None => commit::domain(store, next.product, &grid, newest.as_ref(), steps).await?,

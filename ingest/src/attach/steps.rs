@@ -1,5 +1,6 @@
-//! The steps of a plan in, references to them out: each is decoded and checked as a file's is, and its digest taken.
+//! The steps of a plan in, references to them out: each is decoded and checked band by band as a file's is, and its digest taken.
 
+use std::ops::Range;
 use std::pin::pin;
 
 use contract::digest::Digest;
@@ -12,22 +13,24 @@ use contract::quantity::Quantity;
 use futures::stream::{FuturesOrdered, StreamExt as _};
 use storage::Store;
 use storage::attached::Reference;
+use storage::domain::Cells;
+use storage::fields::FieldDigest;
+use tokio::sync::mpsc;
 
+use super::bands;
 use super::kept::Kept;
 use crate::check::{CheckedBand, Found};
-use crate::decode;
-use crate::decode::DecodedBand;
+use crate::decode::{self, Conversion, RawBand};
 use crate::error::{IngestError, Stop};
 use crate::limits::{Limits, memory};
 use crate::plan::{Plan, PlannedStep};
 
 /// What all steps came to.
-#[derive(Default)]
 pub(super) struct Read {
     /// Those that hold a value, in the order of the store.
     pub(super) steps: Vec<Step>,
     /// Cells that hold a value in one of them.
-    pub(super) domain: Vec<bool>,
+    pub(super) domain: Cells,
     /// What was masked in all.
     pub(super) masked: MaskedCells,
     /// Least and greatest value.
@@ -83,57 +86,71 @@ impl Put<'_> {
     }
 }
 
-/// Steps of the plan that are wanted, one after the other; what is to be done with each is done beside the reading of the next.
+/// Steps of the plan that are wanted, one after the other, each band by band; what is to be done with each is done beside the reading
+/// of the next.
 pub(super) async fn read(
     plan: &mut Plan,
     put: Put<'_>,
     wanted: &[PlannedStep],
     told: &(dyn Fn(usize, usize) + Send + Sync),
 ) -> Result<Read, Stop> {
-    // Maps are read whole here.
-    let whole = Limits {
-        band_cells: u64::MAX,
+    let own = Own::of(plan, put, wanted)?;
+    let band_rows = own
+        .bands
+        .iter()
+        .map(|rows| u64::from(rows.end - rows.start));
+    let limits = Limits {
+        band_cells: band_rows.max().unwrap_or(0) * u64::from(own.grid.cols),
         ..Limits::default()
     };
-    let at_once = memory::grids_at_once(plan, &whole);
-    let rows = 0..plan.mapping.grid.rows;
-    let own = Own {
-        put,
-        quantity: plan.target.quantity,
-        grid: plan.mapping.grid,
-        variable: plan.variable.name.clone(),
-    };
+    let at_once = memory::grids_at_once(plan, &limits);
     let mut all = Read {
-        domain: vec![false; own.grid.cell_count()],
-        ..Read::default()
+        steps: vec![],
+        domain: Cells::none(own.grid.cell_count()),
+        masked: MaskedCells::default(),
+        range: None,
     };
     let (mut stored, mut done_count) = (FuturesOrdered::new(), 0);
+    let mut take = |done: Result<One, Stop>| {
+        let done = done?;
+        done_count += 1;
+        told(done_count, wanted.len());
+        all.take(done);
+        Ok::<_, Stop>(())
+    };
     for step in wanted {
-        let mut decoding = pin!(decode::run(plan, *step, rows.clone()));
-        let decoded = loop {
-            tokio::select! {
-                decoded = &mut decoding => break decoded?,
-                Some(done) = stored.next() => {
-                    done_count += 1;
-                    told(done_count, wanted.len());
-                    all.take(done?);
-                }
-            }
-        };
-        stored.push_back(own.step(*step, decoded));
         while stored.len() >= at_once
             && let Some(done) = stored.next().await
         {
-            done_count += 1;
-            told(done_count, wanted.len());
-            all.take(done?);
+            take(done)?;
+        }
+        // One band is worked on while the next is read, and no further one is asked for.
+        let (given, taken) = mpsc::channel(1);
+        stored.push_back(own.step(*step, taken));
+        for rows in &own.bands {
+            let mut reading = pin!(async {
+                let Ok(room) = given.reserve().await else {
+                    return Ok(false);
+                };
+                room.send(decode::read(plan, (*step, rows.clone()), None).await?);
+                Ok::<_, Stop>(true)
+            });
+            let is_taken = loop {
+                tokio::select! {
+                    read = &mut reading => break read?,
+                    Some(done) = stored.next() => take(done)?,
+                }
+            };
+            // Nobody takes it: why is the answer of the step, or of one before.
+            if !is_taken {
+                break;
+            }
         }
     }
     while let Some(done) = stored.next().await {
-        done_count += 1;
-        told(done_count, wanted.len());
-        all.take(done?);
+        take(done)?;
     }
+    own.conversion.tell(plan);
     Ok(all)
 }
 
@@ -142,7 +159,10 @@ struct Own<'a> {
     put: Put<'a>,
     quantity: Quantity,
     grid: Grid,
+    /// Rows that are read together, from the north.
+    bands: Vec<Range<u32>>,
     variable: String,
+    conversion: Conversion,
 }
 
 /// A step that was read.
@@ -150,32 +170,62 @@ struct One {
     /// None if it holds no value at all.
     step: Option<Step>,
     found: Found,
-    values: Vec<f32>,
+    /// Cells that hold a value.
+    valued: Cells,
 }
 
-impl Own<'_> {
-    async fn step(&self, planned: PlannedStep, decoded: DecodedBand) -> Result<One, Stop> {
-        let period = planned.period;
-        let (quantity, grid, variable) = (self.quantity, self.grid, self.variable.clone());
-        let (found, values, digest) = tokio::task::spawn_blocking(move || {
-            let mut found = Found::nothing();
-            let CheckedBand(values) = found.band(decoded, quantity);
-            found.check(quantity, &variable, period)?;
-            let digest = storage::fields::digest_of(&grid, &values, period);
-            Ok::<_, Stop>((found, values, digest))
+impl<'a> Own<'a> {
+    fn of(plan: &Plan, put: Put<'a>, wanted: &[PlannedStep]) -> Result<Self, Stop> {
+        let variable = &plan.variable.name;
+        let starts = match bands::rows_axis(&plan.axes) {
+            Some(axis) if !wanted.is_empty() => plan.values.chunk_starts(variable, axis)?,
+            _ => vec![],
+        };
+        Ok(Self {
+            put,
+            quantity: plan.target.quantity,
+            grid: plan.mapping.grid,
+            bands: bands::of(&plan.mapping, &starts),
+            variable: variable.clone(),
+            conversion: Conversion::of(plan),
         })
-        .await??;
+    }
+
+    async fn step(
+        &self,
+        planned: PlannedStep,
+        mut read: mpsc::Receiver<RawBand>,
+    ) -> Result<One, Stop> {
+        let period = planned.period;
+        let mut work = Work {
+            quantity: self.quantity,
+            conversion: self.conversion.clone(),
+            found: Found::nothing(),
+            valued: Cells::none(self.grid.cell_count()),
+            digest: FieldDigest::new(&self.grid, period),
+            cells_done: 0,
+        };
+        while let Some(band) = read.recv().await {
+            work = tokio::task::spawn_blocking(move || work.band(band)).await??;
+        }
+        let Work {
+            found,
+            valued,
+            digest,
+            ..
+        } = work;
+        found.check(self.quantity, &self.variable, period)?;
         if found.valid_cells == 0 {
             return Ok(One {
                 step: None,
                 found,
-                values,
+                valued,
             });
         }
-        let reference = self.put.reference(&planned, grid);
-        let field = self.put.reference_to(&digest, &reference).await?;
+        let reference = self.put.reference(&planned, self.grid);
+        let field = self.put.reference_to(&digest.finish(), &reference).await?;
         let step = Step {
-            period: planned.period,
+            period,
             field,
             raw_sha256: self.put.attachment,
             origin: self.put.origin.to_owned(),
@@ -186,8 +236,29 @@ impl Own<'_> {
         Ok(One {
             step: Some(step),
             found,
-            values,
+            valued,
         })
+    }
+}
+
+/// One step of which bands are turned and checked, on a thread that may take its time.
+struct Work {
+    quantity: Quantity,
+    conversion: Conversion,
+    found: Found,
+    valued: Cells,
+    digest: FieldDigest,
+    cells_done: usize,
+}
+
+impl Work {
+    fn band(mut self, band: RawBand) -> Result<Self, Stop> {
+        let band = self.conversion.band(band)?;
+        let CheckedBand(values) = self.found.band(band, self.quantity);
+        self.valued.add_valued(self.cells_done, &values);
+        self.digest.add(&values);
+        self.cells_done += values.len();
+        Ok(self)
     }
 }
 
@@ -200,8 +271,7 @@ impl Read {
         let [low, high] = one.found.range();
         let range = self.range;
         self.range = Some(range.map_or([low, high], |[l, h]| [l.min(low), h.max(high)]));
-        let cells = self.domain.iter_mut().zip(&one.values);
-        cells.for_each(|(cell, value)| *cell |= !value.is_nan());
+        self.domain.add(&one.valued);
         self.steps.push(step);
     }
 }

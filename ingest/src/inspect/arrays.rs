@@ -101,6 +101,22 @@ impl Arrays {
         Ok(read)
     }
 
+    /// First indexes of the chunks of an array along one of those axes that are described, ascending.
+    pub(crate) fn chunk_starts(
+        &self,
+        variable: &str,
+        axis: usize,
+    ) -> Result<Vec<u64>, ForeignError> {
+        let array = self.foreign.array(variable)?;
+        let dimensions = array.dimensions.iter().enumerate();
+        let mut described = dimensions
+            .filter(|(_, (name, _))| index(&self.indexes, array, name.as_deref()).is_none());
+        match described.nth(axis) {
+            Some((dimension, _)) => array.chunk_starts(dimension),
+            None => Ok(vec![]),
+        }
+    }
+
     /// Why an array that is there is not among those that are described: a codec, say, that this program does not have.
     pub(crate) fn unread(&self, variable: &str) -> Option<&ForeignError> {
         self.foreign.unread(variable)

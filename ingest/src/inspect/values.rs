@@ -2,7 +2,7 @@
 
 use cube::foreign::ForeignError;
 
-use super::arrays::Arrays;
+use super::arrays::{Arrays, stopped};
 use super::file::description::Part;
 use super::reader::session::Session;
 use crate::error::Stop;
@@ -32,6 +32,15 @@ impl Values {
         match self {
             Self::Process(session) => session.read(variable, part, expected).await,
             Self::Arrays(arrays) => arrays.read(variable, part, expected).await,
+        }
+    }
+
+    /// First indexes along an axis of a variable of what is unpacked at once, ascending; none of a file, whose reader keeps what the next
+    /// band needs too.
+    pub(crate) fn chunk_starts(&self, variable: &str, axis: usize) -> Result<Vec<u64>, Stop> {
+        match self {
+            Self::Process(_) => Ok(vec![]),
+            Self::Arrays(arrays) => arrays.chunk_starts(variable, axis).map_err(stopped),
         }
     }
 

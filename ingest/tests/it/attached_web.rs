@@ -2,10 +2,14 @@
 
 use std::path::PathBuf;
 
+use contract::kind::Vouched;
+use contract::manifest::Manifest;
+use ingest::attach::{Request, refresh};
 use serde_json::json;
-use storage::fields;
+use storage::{Store, fields};
 
 use crate::attached::{Own, assert_same, expected, fixture, readable, request};
+use crate::fixture::{Place, SmallFile};
 use crate::web_server::{Answer, WebServer};
 
 /// Serves the files of a folder under `/data/`; what is not there is 404.
@@ -42,6 +46,59 @@ async fn stores_are_read_over_http_with_and_without_consolidated_metadata() {
             let values = own.values(&newest, step).await.unwrap();
             assert_same(&values, expected, &format!("{name} step {step}"));
         }
+    }
+}
+
+fn digests(version: &Manifest) -> Vec<Vouched> {
+    let fields = version.steps.iter().map(|step| step.field.vouches());
+    fields.collect()
+}
+
+/// Our own cube is a repository like any other. Nothing of it is listed: its state names all that is in it.
+#[tokio::test]
+async fn a_repository_is_read_over_http_in_the_state_that_it_had() {
+    let mut place = Place::new();
+    place.store = Store::open(place.path("data").to_str().unwrap()).unwrap();
+    let file = place.path("a.nc");
+    SmallFile::new().write_classic(&file);
+    place.land(&[file]).await;
+    let landed = place.newest("fgco2").await;
+    let server = serve(place.path("data/cubes/fgco2")).await;
+    let own = Own::new();
+    let request = Request {
+        product: Some("sst".parse().unwrap()),
+        ..request(&address(&server), "carbon_flux")
+    };
+    let attached = own.ask(&request).await.unwrap();
+    assert!(attached.snapshot.is_some(), "{attached:?}");
+    let first = own.newest().await;
+    assert_eq!(digests(&first), digests(&landed));
+    for step in 0..first.steps.len() {
+        let values = own.values(&first, step).await.unwrap();
+        assert_same(&values, &place.values(&landed, step).await, "over HTTP");
+    }
+    // The branch moves: what was attached is what it was, and of what is only longer the new steps alone are read.
+    let later = SmallFile {
+        time_unit: Some("days since 2001-03-01"),
+        ..SmallFile::new()
+    };
+    later.write_classic(&place.path("b.nc"));
+    place.land(&[place.path("b.nc")]).await;
+    let fresh = readable(&own.store.bare());
+    let still = fields::read(&fresh, &first.steps[0].field, &first.grid).await;
+    assert_same(&still.unwrap(), &place.values(&landed, 0).await, "pinned");
+    let product = "sst".parse().unwrap();
+    let next = refresh(&own.store, &product, &|_, _| ()).await.unwrap();
+    assert_eq!((next.steps, next.read, next.version.number), (4, 2, 2));
+    let landed = place.newest("fgco2").await;
+    assert_eq!(digests(&own.newest().await), digests(&landed));
+    // What was lost there is an error that names it: here all that says where chunks lie.
+    std::fs::remove_dir_all(place.path("data/cubes/fgco2/manifests")).unwrap();
+    let fresh = readable(&own.store.bare());
+    let read = fields::read(&fresh, &first.steps[0].field, &first.grid).await;
+    let error = read.unwrap_err().to_string();
+    for part in [&server.address.to_string()[..], "array carbon_flux"] {
+        assert!(error.contains(part), "{part}: {error}");
     }
 }
 

@@ -286,7 +286,7 @@ const READER_BYTES: u64 = 384 << 20;
 const OWN_BYTES: u64 = 256 << 20;
 
 /// Most memory that this process had so far, bytes.
-fn peak_bytes() -> u64 {
+pub(crate) fn peak_bytes() -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap();
     let line = status.lines().find(|line| line.starts_with("VmHWM:"));
     let kib = line.unwrap().split_whitespace().nth(1).unwrap();

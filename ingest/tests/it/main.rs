@@ -5,6 +5,7 @@
 
 mod attached;
 mod attached_again;
+mod attached_bands;
 mod attached_bounds;
 mod attached_cubes;
 mod attached_moved;

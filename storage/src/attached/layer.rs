@@ -17,19 +17,24 @@ use object_store::{
     MultipartUpload, ObjectMeta, ObjectStore, ObjectStoreExt as _, PutMultipartOptions, PutOptions,
     PutPayload, PutResult, Result,
 };
-use quick_cache::Weighter;
-use quick_cache::sync::Cache;
+use quick_cache::sync::{Cache, DefaultLifecycle};
+use quick_cache::{DefaultHashBuilder, OptionsBuilder, Weighter};
 
 use super::attachment::{Attachment, MAX_ATTACHMENT_BYTES};
+use super::field::{Rows, is_large};
 use super::reference::{MAX_REFERENCE_BYTES, Reference, named};
 use super::source::Source;
+use crate::StorageError;
+use crate::content::{Content, PIECE_BYTES};
 use crate::failure::{Cause, Failure};
-use crate::fields;
 use crate::off_thread::off_thread;
-use crate::parquet_table::shape_only;
 
 /// Fields that were read from elsewhere and are kept, bytes of them as fields.
 const KEPT_BYTES: u64 = 256 << 20;
+/// The same of large ones, in files: who reads a field of many bands asks for each by itself.
+const KEPT_FILE_BYTES: u64 = 8 << 30;
+/// Of these at least so many are kept, however large they are.
+const KEPT_FILES: u64 = 4;
 /// Fields that are known to be here, by name.
 const KNOWN_FIELDS: usize = 1 << 16;
 /// Attachments that are kept.
@@ -41,7 +46,9 @@ const NAME: &str = "attached store";
 pub(super) struct Held {
     source: Arc<dyn Source>,
     /// By their path, the bytes that a field of them would be: what one store holds says nothing of another that is to hold the same.
-    fields: Cache<String, Bytes, BySize>,
+    fields: Cache<String, Content, BySize>,
+    /// The same of large ones.
+    large: Cache<String, Content, BySize>,
     /// Paths where fields themselves are.
     here: Cache<String, ()>,
     attachments: Cache<(ProductId, Digest), Arc<Attachment>>,
@@ -50,17 +57,31 @@ pub(super) struct Held {
 #[derive(Clone)]
 struct BySize;
 
-impl Weighter<String, Bytes> for BySize {
-    fn weight(&self, _path: &String, content: &Bytes) -> u64 {
-        content.len() as u64
+impl Weighter<String, Content> for BySize {
+    fn weight(&self, _path: &String, content: &Content) -> u64 {
+        content.size_bytes().min(KEPT_FILE_BYTES / KEPT_FILES)
     }
+}
+
+/// Fields of so many bytes. In one shard: in several, of which there are more the more processors there are, each would have a part of
+/// the room that a field may not fit into.
+fn kept(bytes: u64) -> Cache<String, Content, BySize> {
+    let options = OptionsBuilder::new()
+        .shards(1)
+        .estimated_items_capacity(KNOWN_FIELDS)
+        .weight_capacity(bytes)
+        .build()
+        .expect("both capacities are given");
+    let (hasher, lifecycle) = (DefaultHashBuilder::default(), DefaultLifecycle::default());
+    Cache::with_options(options, BySize, hasher, lifecycle)
 }
 
 impl Held {
     pub(super) fn new(source: Arc<dyn Source>) -> Self {
         Self {
             source,
-            fields: Cache::with_weighter(KNOWN_FIELDS, KEPT_BYTES, BySize),
+            fields: kept(KEPT_BYTES),
+            large: kept(KEPT_FILE_BYTES),
             here: Cache::new(KNOWN_FIELDS),
             attachments: Cache::new(KEPT_ATTACHMENTS),
         }
@@ -138,24 +159,24 @@ impl Layer {
     }
 
     /// The bytes of the field that a reference refers to.
-    async fn content(&self, at: &Path, place: &Place, reference: Reference) -> Result<Bytes> {
+    async fn content(&self, at: &Path, place: &Place, reference: Reference) -> Result<Content> {
         let read = self.read(place, reference);
-        let fields = &self.held.fields;
-        fields.get_or_insert_async(at.as_ref(), read).await
+        let Held { fields, large, .. } = &*self.held;
+        let kept = if is_large(&reference) { large } else { fields };
+        kept.get_or_insert_async(at.as_ref(), read).await
     }
 
-    async fn read(&self, place: &Place, reference: Reference) -> Result<Bytes> {
+    async fn read(&self, place: &Place, reference: Reference) -> Result<Content> {
         let attachment = self.attachment(place, reference.attachment).await?;
         let source = &self.held.source;
-        let values = source.values(&attachment, &reference).await;
-        let mut found = encoded(values, &reference, place.digest).await?;
+        let read = || encoded(&**source, &attachment, &reference, place.digest);
+        let mut found = read().await?;
         let may_be_old = match &found {
             Ok(content) => content.is_none(),
             Err(failure) => failure.cause == Cause::Content,
         };
         if may_be_old && source.let_go(&attachment) {
-            let values = source.values(&attachment, &reference).await;
-            found = encoded(values, &reference, place.digest).await?;
+            found = read().await?;
         }
         if let Some(content) = found.map_err(failed)? {
             return Ok(content);
@@ -203,7 +224,7 @@ impl Layer {
     }
 
     /// The field at a path and what is known of its object, if a reference is there.
-    async fn attached(&self, at: &Path) -> Result<Option<(ObjectMeta, Bytes)>> {
+    async fn attached(&self, at: &Path) -> Result<Option<(ObjectMeta, Content)>> {
         let Some(place) = place(at) else {
             return Ok(None);
         };
@@ -214,48 +235,77 @@ impl Layer {
             return Ok(None);
         };
         let content = self.content(at, &place, reference).await?;
-        meta.size = content.len() as u64;
+        meta.size = content.size_bytes();
         Ok(Some((meta, content)))
     }
 }
 
-/// The bytes of the field of some values; none if they are others than those of its name.
+/// The bytes of the field of a step, which is read band by band if it is large; none if its values are others than those of its name.
 async fn encoded(
-    values: std::result::Result<Vec<f32>, Failure>,
+    source: &dyn Source,
+    attachment: &Arc<Attachment>,
     reference: &Reference,
     digest: Digest,
-) -> Result<std::result::Result<Option<Bytes>, Failure>> {
-    let values = match values {
-        Ok(values) => values,
+) -> Result<std::result::Result<Option<Content>, Failure>> {
+    let bands = if is_large(reference) {
+        source.bands(attachment, reference).await
+    } else {
+        Ok(std::iter::once(0..reference.rows).collect())
+    };
+    let bands = match bands {
+        Ok(bands) => bands,
         Err(failure) => return Ok(Err(failure)),
     };
-    let grid = shape_only(reference.rows, reference.cols);
-    let period = reference.period;
-    let encoded = off_thread(move || {
-        if values.len() != grid.cell_count() {
-            return Ok(None);
-        }
-        let encoded = fields::encode(&grid, &values, period)?;
-        Ok((encoded.values_sha256 == digest).then_some(encoded.content))
-    });
-    encoded.await.map(Ok).map_err(|e| failed(Box::new(e)))
+    let mut field = Rows::none(reference).map_err(unwritten)?;
+    for rows in bands {
+        let cells = rows.len() * reference.cols as usize;
+        let values = match source.values(attachment, reference, rows).await {
+            Ok(values) if values.len() == cells => values,
+            Ok(_others) => return Ok(Ok(None)),
+            Err(failure) => return Ok(Err(failure)),
+        };
+        let written = off_thread(move || field.and(values)).await;
+        field = written.map_err(unwritten)?;
+    }
+    let named = off_thread(move || field.named(digest)).await;
+    named.map(Ok).map_err(unwritten)
+}
+
+fn unwritten(error: StorageError) -> Error {
+    failed(Box::new(error))
+}
+
+/// Some bytes of a field; those of a file are read on a thread that nobody waits for.
+async fn part(content: Content, range: Range<u64>) -> Result<Bytes> {
+    if let Content::Bytes(_) = content {
+        return content.part(range).map_err(failed);
+    }
+    let read = tokio::task::spawn_blocking(move || content.part(range));
+    read.await.map_err(failed)?.map_err(failed)
 }
 
 /// The part of a field that is asked for.
-fn answer(meta: ObjectMeta, content: &Bytes, options: &GetOptions) -> Result<GetResult> {
+fn answer(meta: ObjectMeta, content: &Content, options: &GetOptions) -> Result<GetResult> {
     options.check_preconditions(&meta)?;
     let whole = 0..meta.size;
     let range = match &options.range {
         Some(range) => range.as_range(meta.size).map_err(|e| failed(Box::new(e)))?,
         None => whole,
     };
-    let part = if options.head {
-        Bytes::new()
-    } else {
-        content.slice(range.start as usize..range.end as usize)
+    let piece_bytes = match content {
+        Content::Bytes(_) => meta.size.max(1),
+        Content::File(..) | Content::Made(..) => PIECE_BYTES,
     };
+    let asked = if options.head { 0..0 } else { range.clone() };
+    let end = asked.end;
+    let starts = asked.step_by(piece_bytes as usize);
+    let pieces: Vec<_> = starts
+        .map(|start| start..end.min(start + piece_bytes))
+        .collect();
+    let content = content.clone();
+    let pieces = stream::iter(pieces).then(move |piece| part(content.clone(), piece));
     Ok(GetResult {
-        payload: GetResultPayload::Stream(stream::once(async { Ok(part) }).boxed()),
+        payload: GetResultPayload::Stream(pieces.boxed()),
         meta,
         range,
         attributes: Attributes::default(),
@@ -314,19 +364,16 @@ impl ObjectStore for Layer {
         let Some((_meta, content)) = self.attached(at).await? else {
             return self.inner.get_ranges(at, ranges).await;
         };
-        let part = |range: &Range<u64>| {
-            let is_inside = range.start <= range.end && range.end <= content.len() as u64;
-            let beyond = || {
-                failed(format!(
-                    "bytes {range:?} of {} were asked for",
-                    content.len()
-                ))
-            };
-            is_inside
-                .then(|| content.slice(range.start as usize..range.end as usize))
-                .ok_or_else(beyond)
-        };
-        ranges.iter().map(part).collect()
+        let mut parts = vec![];
+        for range in ranges {
+            let size_bytes = content.size_bytes();
+            if range.start > range.end || range.end > size_bytes {
+                let beyond = format!("bytes {range:?} of {size_bytes} were asked for");
+                return Err(failed(beyond));
+            }
+            parts.push(part(content.clone(), range.clone()).await?);
+        }
+        Ok(parts)
     }
 
     fn delete_stream(
