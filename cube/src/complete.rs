@@ -4,7 +4,9 @@
 
 use std::sync::Arc;
 
+use contract::chunk::Window;
 use contract::digest::Digest;
+use contract::level::Level;
 use icechunk::format::ChunkIndices;
 use icechunk::session::SessionErrorKind;
 use storage::Store;
@@ -16,7 +18,8 @@ use crate::joining::Joiner;
 use crate::levels::MadeOf;
 use crate::parts::{Parts, Sent, SentStep};
 use crate::state::State;
-use crate::{At, Bands as _, Cube, CubeError, Repository};
+use crate::step_bands::StepBands;
+use crate::{At, Cube, CubeError, Repository};
 
 /// Steps that are committed together.
 const STEPS_AT_ONCE: usize = 16;
@@ -124,64 +127,175 @@ async fn placed(
     })
 }
 
-/// Are the levels of a step, where it has some, those of its values?
+/// Is a step what its digest says, and are its levels, where it has some, those of its values? It is read once, in bands of at most so
+/// many cells or one row of chunks.
 ///
 /// # Errors
-/// `Chunk` with the level that is not.
-pub(crate) async fn compare(cube: &Cube, step: usize) -> Result<(), CubeError> {
-    if !cube.has_levels(step) {
-        return Ok(());
-    }
+/// `Step` if it is not; else `Chunk` with the level that is not.
+pub(crate) async fn compare(cube: &Cube, step: usize, most_cells: u64) -> Result<(), CubeError> {
     let description = cube.description();
-    let grid = &description.grid;
-    let mut joiner = Joiner::of_all(grid, description.quantity);
-    let mut bands = CubeBands {
-        cube: cube.clone(),
-        step,
+    let levels: Vec<Level> = if cube.has_levels(step) {
+        cube.levels().copied().collect()
+    } else {
+        vec![]
     };
-    let levels: Vec<_> = cube.levels().copied().collect();
     let mut rows_done = vec![0; levels.len()];
-    for rows in parts_of(grid.rows, crate::Layout::of(grid).object[0]) {
-        let values = bands.rows(rows).await?;
-        let joined = tokio::task::spawn_blocking(move || {
-            joiner.take(&values);
-            joiner
-        });
-        joiner = joined
-            .await
-            .map_err(|e| CubeError::library("a thread", "joining cells", e))?;
-        for (number, level) in levels.iter().enumerate() {
-            let own = joiner.done(number);
-            let count = (own.values.len() / level.grid.cols as usize) as u32;
-            if count == 0 {
-                continue;
+    let mut bands = StepBands::of(cube, step, most_cells);
+    // What is wrong with levels is told when the values are known to be right.
+    let mut joined = Ok(Joiner::new(
+        &description.grid,
+        description.quantity,
+        &levels,
+        0,
+    ));
+    while let Some((_rows, values)) = bands.next().await? {
+        joined = match joined {
+            Ok(joiner) if !levels.is_empty() => {
+                let own = (levels.as_slice(), rows_done.as_mut_slice());
+                compare_rows(cube, step, own, joiner, values).await
             }
-            let window = contract::chunk::Window {
-                row: rows_done[number],
-                col: 0,
-                rows: count,
-                cols: level.grid.cols,
-            };
-            rows_done[number] += count;
-            let Some(told) = cube.window_at(level.number, window, step).await? else {
-                continue;
-            };
-            let bits = |value: &f32| value.to_bits();
-            let is_same = told.values.iter().map(bits).eq(own.values.iter().map(bits))
-                && told.coverage == own.coverage;
-            if !is_same {
-                return Err(CubeError::Chunk {
-                    array: crate::arrays::level_group(level),
-                    chunk: vec![step as u64],
-                    reason: "its values are not those of its step".to_owned(),
-                });
-            }
-        }
+            told => told,
+        };
     }
-    Ok(())
+    joined.map(|_joiner| ())
 }
 
-fn parts_of(rows: u32, height: u32) -> impl Iterator<Item = std::ops::Range<u32>> {
-    let parts = 0..rows.div_ceil(height);
-    parts.map(move |part| part * height..((part + 1) * height).min(rows))
+/// Joins the next rows of a step, and compares the rows of levels that are done with them, from those on that were, with what is there.
+async fn compare_rows(
+    cube: &Cube,
+    step: usize,
+    (levels, rows_done): (&[Level], &mut [u32]),
+    mut joiner: Joiner,
+    values: Vec<f32>,
+) -> Result<Joiner, CubeError> {
+    let joined = tokio::task::spawn_blocking(move || {
+        joiner.take(&values);
+        joiner
+    });
+    let mut joiner = joined
+        .await
+        .map_err(|e| CubeError::library("a thread", "joining cells", e))?;
+    for (number, level) in levels.iter().enumerate() {
+        let own = joiner.done(number);
+        let count = (own.values.len() / level.grid.cols as usize) as u32;
+        if count == 0 {
+            continue;
+        }
+        let window = Window {
+            row: rows_done[number],
+            col: 0,
+            rows: count,
+            cols: level.grid.cols,
+        };
+        rows_done[number] += count;
+        let Some(told) = cube.window_at(level.number, window, step).await? else {
+            continue;
+        };
+        let bits = |value: &f32| value.to_bits();
+        let is_same = told.values.iter().map(bits).eq(own.values.iter().map(bits))
+            && told.coverage == own.coverage;
+        if !is_same {
+            return Err(CubeError::Chunk {
+                array: crate::arrays::level_group(level),
+                chunk: vec![step as u64],
+                reason: "its values are not those of its step".to_owned(),
+            });
+        }
+    }
+    Ok(joiner)
+}
+
+#[cfg(test)]
+mod tests {
+    use contract::grid::Grid;
+    use contract::quantity::Quantity;
+    use contract::time::Period;
+
+    use super::*;
+    use crate::{Description, Edit, WholeField};
+
+    /// Three rows of two chunks.
+    const GRID: Grid = Grid {
+        rows: 1030,
+        cols: 600,
+        north_deg: 80.0,
+        west_deg: 0.0,
+        dlat_deg: 0.125,
+        dlon_deg: 0.125,
+    };
+
+    fn values() -> Vec<f32> {
+        let value = |cell: usize| match cell % 11 {
+            0 => f32::NAN,
+            _ => cell as f32,
+        };
+        (0..GRID.cell_count()).map(value).collect()
+    }
+
+    /// The same with another value in the last cell, which lies in the last band.
+    fn other_values() -> Vec<f32> {
+        let mut values = values();
+        values[GRID.cell_count() - 1] = -1e6;
+        values
+    }
+
+    /// A cube of a step of some values that says a digest.
+    async fn repository_of(store: &Store, values: Vec<f32>, values_sha256: Digest) -> Repository {
+        let description = Description {
+            product: "p".parse().unwrap(),
+            title: "P".to_owned(),
+            quantity: Quantity::SeaSurfaceTemperature,
+            synthetic: true,
+            source: "a test".to_owned(),
+            grid: GRID,
+            version: None,
+            statistic: None,
+        };
+        let repository = Repository::create(store, "p", &description).await.unwrap();
+        let mut edit = Edit::begin(&repository).await.unwrap();
+        let mut bands = WholeField::new(values.into(), GRID.cols);
+        let period = Period::month(2000, 1).unwrap();
+        let put = edit.put_bands(period, values_sha256, &mut bands);
+        put.await.unwrap();
+        edit.commit("one").await.unwrap();
+        repository
+    }
+
+    #[tokio::test]
+    async fn a_step_and_its_levels_are_compared_in_bands_as_they_are_whole() {
+        let period = Period::month(2000, 1).unwrap();
+        let own = storage::fields::digest_of(&GRID, &values(), period);
+        for most_cells in [1, u64::MAX] {
+            let store = Store::memory();
+            let repository = repository_of(&store, values(), own).await;
+            let cube = repository.at(&At::Newest).await.unwrap();
+            assert!(cube.has_levels(0));
+            compare(&cube, 0, most_cells).await.unwrap();
+
+            // Levels of other values, under the digest of these.
+            let parts = Parts::new(cube.description()).unwrap();
+            let session = repository.session().await.unwrap();
+            let mut bands = WholeField::new(other_values().into(), GRID.cols);
+            let sent = parts.send(&session, &mut bands, Sent::Levels).await;
+            let made = [Made {
+                values_sha256: own,
+                sent: sent.unwrap(),
+            }];
+            let is_placed = placed(&repository, &cube, &parts, &made).await;
+            assert!(is_placed.unwrap());
+            let cube = repository.at(&At::Newest).await.unwrap();
+            let told = compare(&cube, 0, most_cells).await.unwrap_err();
+            let CubeError::Chunk { array, .. } = &told else {
+                panic!("{told}");
+            };
+            assert_eq!(array, "levels/1", "{most_cells}");
+
+            // Other values than the digest names, whose levels are theirs: the step is what is wrong.
+            let store = Store::memory();
+            let repository = repository_of(&store, other_values(), own).await;
+            let cube = repository.at(&At::Newest).await.unwrap();
+            let told = compare(&cube, 0, most_cells).await.unwrap_err();
+            assert!(matches!(told, CubeError::Step { .. }), "{told}");
+        }
+    }
 }

@@ -1,6 +1,8 @@
 //! How a field is cut: into chunks that are read and checked each by itself, and where there are many, shards of chunks
 //! that are an object each.
 
+use std::ops::Range;
+
 use contract::chunk::Window;
 use contract::grid::Grid;
 
@@ -87,6 +89,22 @@ impl Layout {
         ]
     }
 
+    /// Bands of whole rows of chunks of a grid, north to south, that hold at most so many cells each, but for a band of one row of
+    /// chunks.
+    pub(crate) fn bands(
+        &self,
+        grid: &Grid,
+        most_cells: u64,
+    ) -> impl Iterator<Item = Range<u32>> + use<> {
+        let (rows, height) = (grid.rows, self.chunk[0]);
+        let chunk_row_cells = u64::from(height) * u64::from(grid.cols);
+        let chunk_rows = u64::from(rows.div_ceil(height));
+        let at_once = (most_cells / chunk_row_cells.max(1)).clamp(1, chunk_rows.max(1));
+        let band_rows = at_once as u32 * height;
+        let starts = (0..rows.div_ceil(band_rows)).map(move |band| band * band_rows);
+        starts.map(move |first| first..first.saturating_add(band_rows).min(rows))
+    }
+
     /// Chunks that a window of cells touches, by row and column of chunks.
     pub(crate) fn chunks_of(&self, window: Window) -> impl Iterator<Item = [u32; 2]> + use<> {
         let [rows, cols] = self.chunk;
@@ -127,6 +145,21 @@ mod tests {
         assert_eq!(larger.objects(&grid(18_000, 36_000)), [18, 3]);
         let level = Layout::of_level(&grid(4500, 9000));
         assert_eq!((level.chunk, level.object), ([500, 500], [1000, 16_000]));
+    }
+
+    #[test]
+    fn bands_are_whole_rows_of_chunks() {
+        let of = |grid: &Grid, most_cells| {
+            let bands = Layout::of(grid).bands(grid, most_cells);
+            let edges = bands.map(|band| [band.start, band.end]);
+            edges.collect::<Vec<_>>()
+        };
+        let small = grid(1030, 600);
+        assert_eq!(of(&small, 1), [[0, 344], [344, 688], [688, 1030]]);
+        assert_eq!(of(&small, 688 * 600), [[0, 688], [688, 1030]]);
+        assert_eq!(of(&small, u64::MAX), [[0, 1030]]);
+        let large = of(&grid(18_000, 36_000), 1 << 23);
+        assert_eq!((large.len(), large[1]), (36, [500, 1000]));
     }
 
     #[test]

@@ -51,6 +51,7 @@ mod series;
 mod shards;
 mod staged;
 mod state;
+mod step_bands;
 mod stored_chunks;
 mod summing;
 mod sums;

@@ -5,6 +5,7 @@
 
 use std::collections::BTreeSet;
 
+use contract::chunk::BAND_CELLS;
 use contract::key::ObjectKey;
 use contract::manifest::{Manifest, ManifestId, Step};
 use contract::product::ProductId;
@@ -15,6 +16,7 @@ use storage::verify::{Fault, Finding};
 use storage::{Store, fields, manifests};
 
 use crate::follow::folder;
+use crate::step_bands::StepBands;
 use crate::{At, Cube, CubeError, Description, Follower, Repository, compact, verify};
 
 /// Steps that are read at a time to be compared, each twice.
@@ -194,22 +196,26 @@ impl Migration<'_> {
     ) -> Result<(), CubeError> {
         let read = |place: usize| async move {
             let step = &manifest.steps[place];
-            let wanted = fields::read(self.store, &step.field, &manifest.grid);
-            let (wanted, found) = futures::join!(wanted, cube.field(place));
-            Ok::<_, CubeError>((step, wanted?, found?))
+            let found = first_difference((self.store, &step.field), (cube, place), BAND_CELLS);
+            Ok::<_, CubeError>((step, found.await?))
         };
         let mut steps = stream::iter(places.to_vec())
             .map(read)
             .buffered(STEPS_AT_ONCE);
-        while let Some((step, wanted, found)) = steps.try_next().await? {
-            if let Some(cell) = first_difference(&wanted, &found) {
+        while let Some((step, difference)) = steps.try_next().await? {
+            if let Some(Difference {
+                cell,
+                wanted,
+                found,
+            }) = difference
+            {
                 let (row, col) = (
                     cell / manifest.grid.cols as usize,
                     cell % manifest.grid.cols as usize,
                 );
                 let reason = format!(
-                    "step {}: the cell of row {row}, column {col} is {}, and {} in {}",
-                    step.period, found[cell], wanted[cell], step.field
+                    "step {}: the cell of row {row}, column {col} is {found}, and {wanted} in {}",
+                    step.period, step.field
                 );
                 return Err(self.differs(&cube.array_name(), manifest, reason));
             }
@@ -247,8 +253,144 @@ impl Migration<'_> {
     }
 }
 
-/// The first cell whose values have other bits; both are of the same cells.
-fn first_difference(one: &[f32], other: &[f32]) -> Option<usize> {
-    let differs = |(a, b): (&f32, &f32)| a.to_bits() != b.to_bits();
-    one.iter().zip(other).position(differs)
+/// Where a step of a cube is not what its field is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Difference {
+    /// Counted row by row.
+    cell: usize,
+    /// In the field.
+    wanted: f32,
+    /// In the cube.
+    found: f32,
+}
+
+/// The first cell of a step that has other bits in its field. Both are read in bands of at most so many cells or one row of their chunks,
+/// and to their ends: what is not what its own name says is told as that.
+async fn first_difference(
+    (store, field): (&Store, &ObjectKey),
+    (cube, place): (&Cube, usize),
+    most_cells: u64,
+) -> Result<Option<Difference>, CubeError> {
+    let grid = cube.description().grid;
+    let mut step = StepBands::of(cube, place, most_cells);
+    let opened = fields::bands(store, field, &grid, most_cells);
+    let (opened, first) = futures::join!(opened, step.next());
+    let (mut field, first) = (opened?, first?);
+    let mut found = first.map_or_else(Vec::new, |(_rows, values)| values);
+    // Of the values that were found, of all.
+    let (mut at, mut cell) = (0, 0);
+    let mut difference = None;
+    while let Some((_rows, wanted)) = field.next().await? {
+        let mut done = 0;
+        while done < wanted.len() {
+            if at == found.len() {
+                let Some((_rows, values)) = step.next().await? else {
+                    return Err(CubeError::Shape {
+                        expected: grid.cell_count(),
+                        found: cell,
+                    });
+                };
+                (found, at) = (values, 0);
+            }
+            let count = (wanted.len() - done).min(found.len() - at);
+            let (one, other) = (&wanted[done..][..count], &found[at..][..count]);
+            if difference.is_none() {
+                let mut pairs = one.iter().zip(other);
+                let off = pairs.position(|(one, other)| one.to_bits() != other.to_bits());
+                difference = off.map(|off| Difference {
+                    cell: cell + off,
+                    wanted: one[off],
+                    found: other[off],
+                });
+            }
+            (done, at, cell) = (done + count, at + count, cell + count);
+        }
+    }
+    // Its digest is compared behind the last one.
+    step.next().await?;
+    Ok(difference)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use contract::grid::Grid;
+    use contract::quantity::Quantity;
+
+    use super::*;
+    use crate::Edit;
+
+    /// Eighteen rows of chunks of a field, and three of a cube's: none of their edges is one of the other's.
+    const GRID: Grid = Grid {
+        rows: 1030,
+        cols: 600,
+        north_deg: 80.0,
+        west_deg: 0.0,
+        dlat_deg: 0.125,
+        dlon_deg: 0.125,
+    };
+
+    fn values() -> Vec<f32> {
+        let value = |cell: usize| match cell % 11 {
+            0 => f32::NAN,
+            _ => cell as f32,
+        };
+        (0..GRID.cell_count()).map(value).collect()
+    }
+
+    async fn cube_of(store: &Store, values: Vec<f32>, period: Period) -> Cube {
+        let description = Description {
+            product: "p".parse().unwrap(),
+            title: "P".to_owned(),
+            quantity: Quantity::CarbonFlux,
+            synthetic: true,
+            source: "a test".to_owned(),
+            grid: GRID,
+            version: None,
+            statistic: None,
+        };
+        let repository = Repository::create(store, "cubes/p", &description).await;
+        let repository = repository.unwrap();
+        let mut edit = Edit::begin(&repository).await.unwrap();
+        edit.put(period, Arc::from(values)).await.unwrap();
+        edit.commit("one").await.unwrap();
+        repository.at(&At::Newest).await.unwrap()
+    }
+
+    #[tokio::test]
+    async fn the_first_cell_that_differs_is_the_same_in_bands_of_any_size() {
+        let period = Period::month(2000, 1).unwrap();
+        for most_cells in [1, 3 * 60 * 600, u64::MAX] {
+            let (store, product) = (Store::memory(), "p".parse().unwrap());
+            let field = fields::write(&store, &product, &GRID, &values(), period).await;
+            let field = field.unwrap();
+            let cube = cube_of(&store, values(), period).await;
+            let same = first_difference((&store, &field), (&cube, 0), most_cells).await;
+            assert_eq!(same.unwrap(), None, "{most_cells}");
+
+            let mut others = values();
+            // In the second row of chunks of the cube, and in the last.
+            for cell in [700 * 600 + 7, 1029 * 600 + 8] {
+                others[cell] = -1.0;
+            }
+            let lying = Store::memory();
+            let cube = cube_of(&lying, others.clone(), period).await;
+            let other = first_difference((&store, &field), (&cube, 0), most_cells).await;
+            let expected = Difference {
+                cell: 700 * 600 + 7,
+                wanted: (700 * 600 + 7) as f32,
+                found: -1.0,
+            };
+            assert_eq!(other.unwrap(), Some(expected), "{most_cells}");
+
+            // Sound chunks, and not those of the field's name: it is the field that is told of.
+            let own = fields::write(&store, &product, &GRID, &others, period).await;
+            let content = store.get(&own.unwrap()).await.unwrap();
+            store.put_over(&field, content).await.unwrap();
+            let told = first_difference((&store, &field), (&cube, 0), most_cells).await;
+            let told = told.unwrap_err().to_string();
+            assert!(told.contains(field.as_str()), "{told}");
+        }
+    }
 }

@@ -7,6 +7,7 @@ mod mend;
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use contract::chunk::BAND_CELLS;
 use contract::key::ObjectKey;
 use contract::kind::Kind;
 use contract::manifest::ManifestId;
@@ -234,11 +235,7 @@ impl Check<'_> {
             if broken.steps.contains(&(place as u32)) {
                 continue;
             }
-            let checked_step = match cube.field(place).await {
-                Ok(_values) => complete::compare(cube, place).await,
-                Err(error) => Err(error),
-            };
-            match checked_step {
+            match complete::compare(cube, place, BAND_CELLS).await {
                 Ok(()) => {}
                 Err(error @ (CubeError::Chunk { .. } | CubeError::Step { .. })) => {
                     let mut finding = self.finding(&error);

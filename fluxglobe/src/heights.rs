@@ -4,11 +4,13 @@
 use std::collections::BTreeMap;
 
 use anyhow::Result;
+use contract::chunk::BAND_CELLS;
 use contract::grid::Grid;
 use contract::heights::{HEIGHT_LIMIT_M, MOST_LIFT_PX, SHEET_M, kept_share, px_per_m};
 use contract::job::{RenderJob, View};
 use contract::key::ObjectKey;
 use contract::quantity::Quantity;
+use storage::fields::Bands;
 use storage::{Store, fields};
 
 /// The fields that amounts lie between.
@@ -24,14 +26,16 @@ pub(crate) async fn note(store: &Store, job: &RenderJob) -> Result<Option<String
         sample.before.clone(),
         after.map(|after| after.field.clone()),
     );
-    let between = Between::read(store, &job.grid, &pair).await?;
-    let m_per_kg_m2 = job.style.height_m_per_kg_m2;
     let weight = after.map_or(0.0, |after| after.weight);
-    let cut_off = note_of(between.most(weight), m_per_kg_m2);
+    let weights = [weight, 0.0, 1.0];
+    let most = most_between((store, BAND_CELLS), &job.grid, &pair, weights).await?;
+    let [most_shown_kg_m2, most_before_kg_m2, most_after_kg_m2] = most;
+    let m_per_kg_m2 = job.style.height_m_per_kg_m2;
+    let cut_off = note_of(most_shown_kg_m2, m_per_kg_m2);
     let flattened = match job.view {
         View::Tile { tile, size_px } => {
             // As the plan of tiles has it: by both fields, so that a level keeps its scale between them.
-            let most_kg_m2 = between.most(0.0).max(between.most(1.0));
+            let most_kg_m2 = most_before_kg_m2.max(most_after_kg_m2);
             let lifted_m = (most_kg_m2 * m_per_kg_m2).min(HEIGHT_LIMIT_M);
             flattened_note(px_per_m(tile, size_px), lifted_m)
         }
@@ -59,36 +63,65 @@ pub(crate) async fn note_of_film(store: &Store, jobs: &[RenderJob]) -> Result<Op
     };
     let mut most_kg_m2: f64 = 0.0;
     for (pair, weights) in spans {
-        let between = Between::read(store, &first.grid, &pair).await?;
         // Amounts change evenly between two fields: they are largest at an end of what is shown of that.
-        most_kg_m2 = weights
-            .into_iter()
-            .map(|weight| between.most(weight))
-            .fold(most_kg_m2, f64::max);
+        let most = most_between((store, BAND_CELLS), &first.grid, &pair, weights).await?;
+        most_kg_m2 = most.into_iter().fold(most_kg_m2, f64::max);
     }
     Ok(note_of(most_kg_m2, first.style.height_m_per_kg_m2))
 }
 
-/// Accumulated carbon of two fields, kg m⁻².
+/// The largest amounts of either sign between two fields at weights of the second one, kg m⁻². Fields are read in bands of at most so
+/// many cells.
+async fn most_between<const N: usize>(
+    (store, most_cells): (&Store, u64),
+    grid: &Grid,
+    (before, after): &Pair,
+    weights: [f64; N],
+) -> Result<[f64; N]> {
+    let mut of_before = match before {
+        Some(field) => Some(fields::bands(store, field, grid, most_cells).await?),
+        None => None,
+    };
+    let mut of_after = match after {
+        Some(field) => Some(fields::bands(store, field, grid, most_cells).await?),
+        None => None,
+    };
+    let mut most = [0.0; N];
+    loop {
+        let (before, after) = (next(&mut of_before).await?, next(&mut of_after).await?);
+        let between = match (before, after) {
+            (Some(before), Some(after)) => Between { before, after },
+            (Some(before), None) => Between {
+                after: before.clone(),
+                before,
+            },
+            // Accumulation starts.
+            (None, Some(after)) => Between {
+                before: vec![0.0; after.len()],
+                after,
+            },
+            (None, None) => return Ok(most),
+        };
+        for (most, weight) in most.iter_mut().zip(weights) {
+            *most = f64::max(*most, between.most(weight));
+        }
+    }
+}
+
+/// Values of the next rows; none after the last, or of no field.
+async fn next(bands: &mut Option<Bands>) -> Result<Option<Vec<f32>>> {
+    let Some(bands) = bands else { return Ok(None) };
+    let found = bands.next().await?;
+    Ok(found.map(|(_rows, values)| values))
+}
+
+/// Accumulated carbon of the same rows of two fields, kg m⁻².
 struct Between {
     before: Vec<f32>,
     after: Vec<f32>,
 }
 
 impl Between {
-    async fn read(store: &Store, grid: &Grid, (before, after): &Pair) -> Result<Self> {
-        let before = match before {
-            Some(field) => fields::read(store, field, grid).await?,
-            // Accumulation starts.
-            None => vec![0.0; grid.cell_count()],
-        };
-        let after = match after {
-            Some(field) => fields::read(store, field, grid).await?,
-            None => before.clone(),
-        };
-        Ok(Self { before, after })
-    }
-
     /// The largest amount of either sign at a weight of the second field; what is no number has none.
     fn most(&self, weight: f64) -> f64 {
         let sums = self.before.iter().zip(&self.after).map(|(before, after)| {
@@ -129,6 +162,9 @@ fn flattened_note(px_per_m: f64, lifted_m: f64) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
+    use contract::product::ProductId;
+    use contract::time::Period;
+
     use super::*;
 
     #[test]
@@ -152,6 +188,43 @@ mod tests {
         assert!((between.most(0.0) - 0.07).abs() < 1e-6);
         assert!((between.most(0.5) - 0.05).abs() < 1e-6);
         assert!((between.most(1.0) - 0.03).abs() < 1e-6);
+    }
+
+    #[tokio::test]
+    async fn the_most_between_fields_is_the_same_in_bands_of_any_size() {
+        // Three rows of chunks.
+        let grid = Grid {
+            rows: 130,
+            cols: 125,
+            north_deg: 65.0,
+            west_deg: 0.0,
+            dlat_deg: 1.0,
+            dlon_deg: 1.0,
+        };
+        let (store, product) = (Store::memory(), "p".parse::<ProductId>().unwrap());
+        let write = async |month: u32, first: f32, last: f32| {
+            let mut values = vec![f32::NAN; grid.cell_count()];
+            values[0] = first;
+            values[grid.cell_count() - 1] = last;
+            let period = Period::month(2000, month).unwrap();
+            let written = fields::write(&store, &product, &grid, &values, period);
+            Some(written.await.unwrap())
+        };
+        let before = write(1, -0.5, 0.25).await;
+        let after = write(2, -0.125, 1.0).await;
+        for most_cells in [1, u64::MAX] {
+            for (before, after, expected) in [
+                (&before, &after, [0.5, 0.625, 1.0]),
+                (&before, &None, [0.5; 3]),
+                (&None, &after, [0.0, 0.5, 1.0]),
+                (&None, &None, [0.0; 3]),
+            ] {
+                let pair = (before.clone(), after.clone());
+                let weights = [0.0, 0.5, 1.0];
+                let most = most_between((&store, most_cells), &grid, &pair, weights).await;
+                assert_eq!(most.unwrap().to_vec(), expected, "{pair:?}");
+            }
+        }
     }
 
     #[test]

@@ -56,6 +56,22 @@ impl Cells {
         self.words[cell / WORD_BITS] >> (cell % WORD_BITS) & 1 == 1
     }
 
+    /// How many of the cells of a range are of them.
+    ///
+    /// # Panics
+    /// The map has not so many.
+    pub fn count_in(&self, cells: Range<usize>) -> usize {
+        let (mut cell, mut count) = (cells.start, 0);
+        while cell < cells.end {
+            let place = cell % WORD_BITS;
+            let own = (WORD_BITS - place).min(cells.end - cell);
+            let mask = u64::MAX >> (WORD_BITS - own) << place;
+            count += (self.words[cell / WORD_BITS] & mask).count_ones() as usize;
+            cell += own;
+        }
+        count
+    }
+
     /// All of them, ascending.
     pub fn iter(&self) -> impl Iterator<Item = usize> + '_ {
         self.words.iter().enumerate().flat_map(|(at, word)| {
@@ -238,6 +254,10 @@ mod tests {
         );
         assert_eq!(read_cells(&store, &key).await.unwrap(), cells);
         assert_eq!((0..1000).map(|i| cells.has(i)).collect::<Vec<_>>(), bytes);
+        for range in [0..1000, 63..65, 1..130, 128..192, 960..1000] {
+            let count = range.clone().filter(|i| some(*i)).count();
+            assert_eq!(cells.count_in(range.clone()), count, "{range:?}");
+        }
         let mut rest = cells.clone();
         rest.remove_valued(0, &(0..600).map(value).collect::<Vec<_>>());
         assert!(!rest.has(0) && !rest.has(597) && rest.has(600) && rest.is_any());

@@ -3,40 +3,23 @@
 use contract::earth::Earth;
 use contract::grid::Grid;
 use render::stages::layout::COVERED;
+use storage::domain::Cells;
 
 use super::choice::Choice;
 
 /// The figure of the earth that blocks of cells are weighed on, as where the renderer joins them.
 const EARTH: Earth = Earth::Wgs84;
-const WORD_BITS: usize = u64::BITS as usize;
 
 /// A domain.
 pub(super) struct Domain {
     grid: Grid,
-    /// Row by row, each in whole words; the first cell of a word is its lowest bit.
-    words: Vec<u64>,
-    row_words: usize,
+    cells: Cells,
 }
 
 impl Domain {
-    /// None if there is not one flag for each cell.
-    pub(super) fn of(grid: &Grid, flags: &[bool]) -> Option<Self> {
-        if flags.len() != grid.cell_count() {
-            return None;
-        }
-        let cols = grid.cols as usize;
-        let word = |flags: &[bool]| {
-            let bits = flags.iter().enumerate();
-            bits.fold(0, |word, (bit, flag)| word | (u64::from(*flag) << bit))
-        };
-        let rows = flags.chunks(cols);
-        Some(Self {
-            words: rows
-                .flat_map(|row| row.chunks(WORD_BITS).map(word))
-                .collect(),
-            row_words: cols.div_ceil(WORD_BITS),
-            grid: *grid,
-        })
+    /// None if the map of these cells is not as large as the grid.
+    pub(super) fn of(grid: &Grid, cells: Cells) -> Option<Self> {
+        (cells.map_count() == grid.cell_count()).then_some(Self { grid: *grid, cells })
     }
 
     /// Is it of this grid? It is kept under its content, which says nothing of the grid of another job.
@@ -46,18 +29,9 @@ impl Domain {
 
     /// How many of some cells side by side hold data.
     fn count(&self, row: u32, cols: std::ops::Range<u32>) -> u32 {
-        let first = row as usize * self.row_words;
-        let mut count = 0;
-        let mut col = cols.start as usize;
-        let end = cols.end as usize;
-        while col < end {
-            let (word, bit) = (col / WORD_BITS, col % WORD_BITS);
-            let taken = (WORD_BITS - bit).min(end - col);
-            let mask = u64::MAX >> (WORD_BITS - taken) << bit;
-            count += (self.words[first + word] & mask).count_ones();
-            col += taken;
-        }
-        count
+        let first = row as usize * self.grid.cols as usize;
+        let cells = first + cols.start as usize..first + cols.end as usize;
+        self.cells.count_in(cells) as u32
     }
 
     /// How much of every cell of a window holds data, `[row, col]`, of [`COVERED`]: what holds any keeps some. A cell at the edge of
@@ -98,18 +72,23 @@ impl Domain {
 mod tests {
     use super::*;
 
+    const GRID: Grid = Grid {
+        rows: 3,
+        cols: 200,
+        north_deg: 1.0,
+        west_deg: 0.0,
+        dlat_deg: 0.5,
+        dlon_deg: 1.0,
+    };
+
     #[test]
-    fn bits_are_counted_across_words() {
-        let grid = Grid {
-            rows: 3,
-            cols: 200,
-            north_deg: 1.0,
-            west_deg: 0.0,
-            dlat_deg: 0.5,
-            dlon_deg: 1.0,
-        };
-        let flags: Vec<bool> = (0..600).map(|cell| cell % 3 == 0).collect();
-        let domain = Domain::of(&grid, &flags).unwrap();
+    fn cells_are_counted_within_their_rows() {
+        let has_data = |cell: usize| cell.is_multiple_of(3);
+        let mut cells = Cells::none(600);
+        (0..600)
+            .filter(|cell| has_data(*cell))
+            .for_each(|cell| cells.insert(cell));
+        let domain = Domain::of(&GRID, cells).unwrap();
         for (row, cols) in [
             (0, 0..200),
             (1, 63..65),
@@ -117,14 +96,10 @@ mod tests {
             (1, 5..5),
             (2, 128..200),
         ] {
-            let own = flags[row * 200..][cols.start as usize..cols.end as usize].iter();
-            let count = own.filter(|flag| **flag).count() as u32;
-            assert_eq!(
-                domain.count(row as u32, cols.clone()),
-                count,
-                "{row} {cols:?}"
-            );
+            let own = cols.clone().map(|col| (row * 200 + col) as usize);
+            let count = own.filter(|cell| has_data(*cell)).count() as u32;
+            assert_eq!(domain.count(row, cols.clone()), count, "{row} {cols:?}");
         }
-        assert!(Domain::of(&grid, &flags[1..]).is_none());
+        assert!(Domain::of(&GRID, Cells::none(599)).is_none());
     }
 }

@@ -178,13 +178,13 @@ impl Large {
     /// Which cells of a grid hold data in some step; refused if it is of another number of cells.
     async fn domain(&self, grid: &Grid, key: &ObjectKey) -> Result<Arc<Domain>, DrawError> {
         let reading = async {
-            let read = storage::domain::read(&self.store, key).await;
-            let flags = read.map_err(|source| DrawError::Store {
+            let read = storage::domain::read_cells(&self.store, key).await;
+            let cells = read.map_err(|source| DrawError::Store {
                 what: "the domain",
                 product: product_of(key).to_owned(),
                 source: Box::new(source),
             })?;
-            let domain = Domain::of(grid, &flags);
+            let domain = Domain::of(grid, cells);
             domain.map(Arc::new).ok_or_else(|| DrawError::mismatch(key))
         };
         let domain = self.domains.get_or_insert_async(key, reading).await?;
