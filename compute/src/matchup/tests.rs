@@ -57,6 +57,7 @@ async fn product(store: &Store) -> Manifest {
         derived_from: None,
         computed: None,
         notices: vec![],
+        indexes: vec![],
         product,
     }
 }

@@ -23,6 +23,7 @@ mod cubes;
 mod damaged;
 mod faults;
 mod fixture;
+mod further;
 mod guarded;
 mod half_floats;
 mod hostile;

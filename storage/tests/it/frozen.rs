@@ -212,6 +212,7 @@ async fn write(store: &Store) -> Manifest {
         derived_from: None,
         computed: None,
         notices: vec![],
+        indexes: vec![],
     };
     manifests::commit(store, &manifest).await.unwrap();
     contributed::write(store, &product(), &GRID, &counts())
