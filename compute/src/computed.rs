@@ -315,6 +315,7 @@ impl Plan {
             derived_from: computed.inputs.first().map(|input| input.manifest.clone()),
             computed: Some(computed),
             notices: vec![],
+            indexes: vec![],
         }
     }
 }

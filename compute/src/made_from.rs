@@ -119,6 +119,7 @@ mod tests {
                 map: None,
             }),
             notices: vec![],
+            indexes: vec![],
             product,
         }
     }

@@ -22,6 +22,7 @@ use serde::{Deserialize, Serialize};
 use storage::Store;
 
 use crate::ComputeError;
+use crate::summed::{GO_ROUND, PARTS};
 use pair::{Pair, Pairing};
 use statistics::Statistics;
 
@@ -194,6 +195,13 @@ fn one_property(manifest: &Manifest, observations: &[Observation]) -> Result<Str
             first.property, other.property
         );
         return Err(invalid("several", reason));
+    }
+    if manifest.quantity.is_direction() {
+        let reason = format!(
+            "{} holds {GO_ROUND}, so that no difference between two is one of numbers; {PARTS}",
+            manifest.product
+        );
+        return Err(invalid(&first.property, reason));
     }
     let unit = manifest.quantity.unit();
     if let Some(other) = observations.iter().find(|o| o.unit != unit) {

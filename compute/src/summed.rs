@@ -1,5 +1,5 @@
-//! What may be summed over area and time, a flux of carbon and no extreme of one; and what may be averaged, no codes and no days of a year that
-//! goes round.
+//! What may be summed over area and time, a flux of carbon and no extreme of one; and what may be averaged, no codes, and no directions and
+//! days of a year, which go round.
 
 use std::collections::BTreeSet;
 
@@ -14,6 +14,11 @@ use storage::{Store, manifests};
 
 use crate::ComputeError;
 use crate::expression::computed_with;
+
+/// Why directions have no means and no extremes.
+pub(crate) const GO_ROUND: &str = "directions, which go round: the mean of 350 and 10 degrees would be 180, and none of them is the lowest or the highest";
+/// What has, in their place.
+pub(crate) const PARTS: &str = "land the eastward and the northward part of what they are of";
 
 /// Has a product budgets, and is carbon accumulated of it?
 ///
@@ -124,8 +129,12 @@ pub(crate) fn check_averaged(manifest: &Manifest) -> Result<(), ComputeError> {
 /// The same over time alone.
 ///
 /// # Errors
-/// Of codes, whose mean is the code of something else or of nothing.
+/// Of codes, whose mean is the code of something else or of nothing, and of directions, which have neither mean nor extremes.
 pub(crate) fn check_averaged_in_a_cell(manifest: &Manifest) -> Result<(), ComputeError> {
+    if manifest.quantity.is_direction() {
+        let reason = format!("it holds {GO_ROUND}: ask for single places and steps, or {PARTS}");
+        return Err(ContractError::invalid("product", manifest.product.as_str(), reason).into());
+    }
     let Some(code) = manifest.quantity.flags().first() else {
         return Ok(());
     };
@@ -139,7 +148,7 @@ pub(crate) fn check_averaged_in_a_cell(manifest: &Manifest) -> Result<(), Comput
 }
 
 /// # Errors
-/// Of what no mean is to be taken, unless each cell has the value of one: codes of a mask, whose mean is another code, and what
+/// Of what no mean is to be taken, unless each cell has the value of one: codes of a mask, whose mean is another code, directions, and what
 /// [`check_averaged`] refuses.
 pub(crate) fn check_regridded(manifest: &Manifest, method: Regridding) -> Result<(), ComputeError> {
     match method {
@@ -152,13 +161,22 @@ pub(crate) fn check_regridded(manifest: &Manifest, method: Regridding) -> Result
             );
             Err(ComputeError::Expression { reason })
         }
+        Regridding::Bilinear | Regridding::Conservative if manifest.quantity.is_direction() => {
+            let reason = format!(
+                "{} holds {GO_ROUND}: bring it to another grid with --method {}, or {PARTS}",
+                manifest.product,
+                Regridding::Nearest,
+            );
+            Err(ComputeError::Expression { reason })
+        }
         Regridding::Bilinear | Regridding::Conservative => check_averaged(manifest),
     }
 }
 
 /// The method that brings a product to another grid with all that it holds: by means, or where there are none by single cells.
 pub(crate) fn usual_regridding(manifest: &Manifest) -> Regridding {
-    if holds_codes(manifest) || manifest.quantity.is_day_of_year() {
+    let quantity = manifest.quantity;
+    if holds_codes(manifest) || quantity.is_day_of_year() || quantity.is_direction() {
         Regridding::Nearest
     } else {
         Regridding::Conservative
@@ -212,6 +230,7 @@ mod tests {
             derived_from: None,
             computed: None,
             notices: vec![],
+            indexes: vec![],
         }
     }
 
@@ -231,6 +250,10 @@ mod tests {
 
     fn in_days(name: &str) -> Quantity {
         Quantity::open(name, "day", "A day").unwrap()
+    }
+
+    fn direction() -> Quantity {
+        Quantity::open("wind_from_direction", "degree", "Wind direction").unwrap()
     }
 
     fn mask() -> Quantity {
@@ -259,6 +282,7 @@ mod tests {
             landed(phase()),
             computed(phase(), regridded),
             landed(mask()),
+            landed(direction()),
         ];
         for manifest in single {
             let usual = usual_regridding(&manifest);
@@ -283,6 +307,17 @@ mod tests {
         assert!(refused.contains("which go round"), "{refused}");
         check_averaged(&landed(in_days("first_day_of_ice"))).unwrap();
         check_averaged_in_a_cell(&phase).unwrap();
+    }
+
+    #[test]
+    fn directions_have_no_mean_over_an_area_or_over_time() {
+        let wind = landed(direction());
+        for refused in [check_averaged(&wind), check_averaged_in_a_cell(&wind)] {
+            let refused = refused.unwrap_err().to_string();
+            assert!(refused.contains("350 and 10 degrees"), "{refused}");
+        }
+        let zenith = Quantity::open("solar_zenith_angle", "degree", "Zenith angle").unwrap();
+        check_averaged(&landed(zenith)).unwrap();
     }
 
     #[test]

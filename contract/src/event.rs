@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::ContractError;
 use crate::digest::Digest;
+use crate::index::DimensionIndex;
 use crate::job::RenderJob;
 use crate::key::ObjectKey;
 use crate::manifest::ManifestId;
@@ -59,6 +60,9 @@ pub enum Body {
         /// The variable to land, of a file that no profile is for; the one that the file is about, if absent.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         variable: Option<String>,
+        /// Which index is read of dimensions beside time, latitude and longitude; none, if absent.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        indexes: Vec<DimensionIndex>,
         /// What the file's digest must be, if the sender knows.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         sha256: Option<Digest>,
@@ -358,6 +362,21 @@ mod tests {
         let event = Event::from_json(NOTICE_V1).unwrap();
         assert_eq!(event.body.topic(), Topic::GranuleNotice);
         assert_eq!(event.to_json(), NOTICE_V1);
+    }
+
+    #[test]
+    fn a_notice_says_which_index_is_read_of_a_further_dimension() {
+        let json = NOTICE_V1.replace(
+            "\"product\":null",
+            "\"product\":null,\"indexes\":[\"depth=2\"]",
+        );
+        let event = Event::from_json(&json).unwrap();
+        let Body::GranuleNotice { indexes, .. } = &event.body else {
+            panic!("{event:?}")
+        };
+        assert_eq!(indexes[0].to_string(), "depth=2");
+        assert_eq!(event.to_json(), json);
+        assert!(Event::from_json(&json.replace("depth=2", "depth")).is_err());
     }
 
     const LANDED_V1: &str = r#"{"schema":1,"trace":"t","body":{"kind":"granule.landed","path":"a.nc","raw_sha256":"e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855","manifest":"p@1-00000000","periods":[{"start":"2000-01-01T00:00:00Z","end":"2000-02-01T00:00:00Z"}],"revised":false}}"#;

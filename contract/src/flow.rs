@@ -252,6 +252,7 @@ mod tests {
             derived_from: None,
             computed: None,
             notices: vec![],
+            indexes: vec![],
             product,
         }
     }

@@ -26,6 +26,7 @@ pub mod geometry;
 pub mod geometry_text;
 pub mod grid;
 pub mod heights;
+pub mod index;
 pub mod isolines;
 pub mod job;
 pub mod key;

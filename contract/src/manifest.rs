@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 use crate::computed::Computed;
 use crate::digest::Digest;
 use crate::grid::Grid;
+use crate::index::DimensionIndex;
 use crate::key::ObjectKey;
 use crate::masked::MaskedCells;
 use crate::notice::{NoticeOrder, NoticeRun};
@@ -64,6 +65,10 @@ pub struct Manifest {
     /// Place of the steps' files in the order of notices; of steps without one nothing is known, and any file is newer.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub notices: Vec<NoticeRun>,
+    /// Which index of further dimensions its files are read at, in the order of their dimensions: those of another depth or member are another
+    /// product. None of files without further dimensions, and of what is computed or attached.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub indexes: Vec<DimensionIndex>,
 }
 
 /// One time step of a product.
@@ -277,6 +282,7 @@ mod tests {
             derived_from: None,
             computed: None,
             notices: vec![],
+            indexes: vec![],
             product,
         }
     }
@@ -401,6 +407,18 @@ mod tests {
         let json = serde_json::to_string(&m).unwrap();
         assert_eq!(serde_json::from_str::<Manifest>(&json).unwrap(), m);
         assert_ne!(m.id(), old);
+    }
+
+    #[test]
+    fn the_index_that_files_are_read_at_is_part_of_a_version_and_absent_where_there_is_none() {
+        let mut m = manifest(Quantity::CarbonFlux);
+        let flat = m.id();
+        assert!(!serde_json::to_string(&m).unwrap().contains("indexes"));
+        m.indexes = vec!["depth=3".parse().unwrap()];
+        let json = serde_json::to_string(&m).unwrap();
+        assert!(json.contains(r#""indexes":["depth=3"]"#), "{json}");
+        assert_eq!(serde_json::from_str::<Manifest>(&json).unwrap(), m);
+        assert_ne!(m.id(), flat);
     }
 
     #[test]

@@ -85,6 +85,19 @@ impl Display {
 /// What the name of a map of the day of the year ends with that the yearly wave of a quantity has its crest on.
 pub const ANNUAL_PHASE: &str = "_annual_phase";
 
+/// Words of names that are of directions where the unit is an angle; other angles (of elevation, of zenith) do not go round.
+pub const DIRECTION_WORDS: [&str; 4] = ["direction", "azimuth", "bearing", "heading"];
+
+/// How many of a unit are a turn; none of what is no angle.
+pub fn units_per_turn(unit: &str) -> Option<f64> {
+    match unit.to_lowercase().as_str() {
+        "deg" | "degree" | "degrees" | "°" | "degree_true" | "degrees_true" | "degreet"
+        | "degreest" | "degree_t" | "degrees_t" | "arc_degree" | "arc_degrees" => Some(360.0),
+        "rad" | "radian" | "radians" => Some(std::f64::consts::TAU),
+        _ => None,
+    }
+}
+
 impl Quantity {
     /// Every quantity that is built in.
     pub const ALL: [Self; 19] = [
@@ -237,12 +250,14 @@ impl Quantity {
     /// Of directions how many of its units a turn is; none of what is no angle.
     pub fn units_per_turn(self) -> Option<f64> {
         let Self::Open(_) = self else { return None };
-        match self.unit().to_lowercase().as_str() {
-            "deg" | "degree" | "degrees" | "°" | "degree_true" | "degrees_true" | "degreet"
-            | "degreest" | "degree_t" | "degrees_t" | "arc_degree" | "arc_degrees" => Some(360.0),
-            "rad" | "radian" | "radians" => Some(std::f64::consts::TAU),
-            _ => None,
-        }
+        units_per_turn(self.unit())
+    }
+
+    /// Is it where something comes from or goes to, by a word of its name and an angle as its unit? Such values go round: the mean of 350
+    /// and 10 degrees is 0 and not 180, and none of them is the highest.
+    pub fn is_direction(self) -> bool {
+        let is_one = |word: &str| DIRECTION_WORDS.contains(&word);
+        self.units_per_turn().is_some() && self.word().split('_').any(is_one)
     }
 
     /// Is it the day of the year that a yearly wave has its crest on, by the name and the unit that such maps have?
@@ -330,6 +345,22 @@ mod tests {
         assert_eq!(skin.joined(any), None);
         assert_eq!(skin.joined(Quantity::SeaSurfaceFoundationTemperature), None);
         assert_eq!(Quantity::Pco2.joined(Quantity::Fco2), None);
+    }
+
+    #[test]
+    fn a_direction_is_told_by_its_name_and_its_unit() {
+        let is_one = |name, unit| Quantity::open(name, unit, "A").unwrap().is_direction();
+        assert!(is_one("wind_from_direction", "degree"));
+        assert!(is_one("sea_surface_wave_to_direction", "rad"));
+        assert!(is_one("platform_azimuth_angle", "degrees_true"));
+        for (name, unit) in [
+            ("solar_zenith_angle", "degree"),
+            ("wind_from_direction_count", "1"),
+            ("directional_spread", "degree"),
+        ] {
+            assert!(!is_one(name, unit), "{name} {unit}");
+        }
+        assert!(!Quantity::WindSpeed.is_direction());
     }
 
     #[test]

@@ -179,6 +179,7 @@ mod tests {
             derived_from: None,
             computed: None,
             notices: vec![],
+            indexes: vec![],
             product,
         }
     }

@@ -29,6 +29,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
 use contract::grid::LonLatDeg;
+use contract::index::DimensionIndex;
 use contract::job::Mode;
 use contract::product::ProductId;
 use contract::time::TimeMs;
@@ -311,6 +312,10 @@ pub(crate) struct Ingest {
     /// one that it reads; for another give the profile that does.
     #[arg(long, value_name = "NAME", conflicts_with = "profile")]
     pub(crate) variable: Option<String>,
+    /// Of a dimension beside time, latitude and longitude the index that is read, from 0 on: a depth, a height, a member. May be given
+    /// several times. Another index of the same variable is another product.
+    #[arg(long, value_name = "DIMENSION=INDEX")]
+    pub(crate) index: Vec<DimensionIndex>,
     /// One JSON object a file.
     #[arg(long)]
     pub(crate) json: bool,

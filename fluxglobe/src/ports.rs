@@ -388,6 +388,7 @@ mod tests {
             derived_from: None,
             computed: None,
             notices: vec![],
+            indexes: vec![],
             product,
         };
         manifests::commit(store, &manifest).await.unwrap();

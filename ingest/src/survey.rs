@@ -6,13 +6,14 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use async_trait::async_trait;
+use contract::index::DimensionIndex;
 use contract::observation::Observation;
 use storage::Store;
 use storage::log::EmbeddedLog;
 
 use crate::error::IngestError;
 use crate::ingestd::IngestService;
-use crate::notice::Outcome;
+use crate::notice::{Outcome, Wishes};
 use crate::observation::{ObservationSink, SinkError, Stored};
 use crate::pipeline::metrics::class;
 use crate::pipeline::progress::Quiet;
@@ -71,8 +72,17 @@ fn gather(path: &Path, depth: usize, found: &mut Vec<PathBuf>) -> std::io::Resul
     Ok(())
 }
 
-/// Lands each file in a store that is thrown away, one store for the files of a folder, and tells what became of it.
-pub async fn survey(files: &[PathBuf], settings: &Settings) -> Result<Vec<Row>, IngestError> {
+/// Lands each file in a store that is thrown away, one store for the files of a folder, and tells what became of it. Of further
+/// dimensions all of them are read at `indexes`.
+pub async fn survey(
+    files: &[PathBuf],
+    indexes: &[DimensionIndex],
+    settings: &Settings,
+) -> Result<Vec<Row>, IngestError> {
+    let wishes = Wishes {
+        indexes: indexes.to_vec(),
+        ..Wishes::default()
+    };
     let mut sets: BTreeMap<&Path, Vec<PathBuf>> = BTreeMap::new();
     for file in files {
         let folder = file.parent().unwrap_or(Path::new(""));
@@ -84,7 +94,7 @@ pub async fn survey(files: &[PathBuf], settings: &Settings) -> Result<Vec<Row>, 
         let log = Arc::new(EmbeddedLog::memory());
         let service = IngestService::new(Store::memory(), log, settings.clone())
             .with_observations(Arc::new(Passing));
-        service.notify(files, None, None).await?;
+        service.notify_of(files, &wishes).await?;
         let outcomes = service.drain(&Quiet).await?;
         let set = set_name(folder, &folders);
         rows.extend(outcomes.into_iter().map(|outcome| Row {

@@ -111,6 +111,7 @@ fn promised(path: &str, sha256: Option<Digest>, size_bytes: Option<u64>) -> Even
         profile: None,
         product: None,
         variable: None,
+        indexes: vec![],
         sha256,
         size_bytes,
         attempt: 1,

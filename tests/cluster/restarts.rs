@@ -98,6 +98,7 @@ fn one_trace_leads_from_the_notice_to_the_tile() {
         profile: None,
         product: Some(PRODUCT.parse().unwrap()),
         variable: None,
+        indexes: vec![],
         sha256: None,
         size_bytes: None,
         attempt: 1,

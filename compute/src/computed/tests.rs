@@ -51,6 +51,7 @@ async fn land_wind(store: &Store) {
         derived_from: None,
         computed: None,
         notices: vec![],
+        indexes: vec![],
     };
     manifests::commit(store, &manifest).await.unwrap();
 }

@@ -117,6 +117,7 @@ impl<'a> Derivation<'a> {
             derived_from: Some(self.source.id()),
             computed: None,
             notices: vec![],
+            indexes: vec![],
         })
     }
 

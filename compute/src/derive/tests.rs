@@ -77,6 +77,7 @@ async fn landed(
         derived_from: None,
         computed: None,
         notices: vec![],
+        indexes: vec![],
     }
 }
 

@@ -57,6 +57,7 @@ async fn product(store: &Store) -> Manifest {
         derived_from: None,
         computed: None,
         notices: vec![],
+        indexes: vec![],
         product,
     }
 }
@@ -183,4 +184,22 @@ async fn apples_are_not_compared_with_pears() {
             .await
             .is_ok()
     );
+}
+
+#[tokio::test]
+async fn directions_are_not_subtracted() {
+    let store = Store::memory();
+    let manifest = Manifest {
+        quantity: Quantity::open("wind_from_direction", "degree", "Wind direction").unwrap(),
+        ..product(&store).await
+    };
+    let wind = Observation {
+        property: "wind_from_direction".to_owned(),
+        unit: "degree".to_owned(),
+        ..observation("2010-01-10", 10.0, 45.0, 280.0)
+    };
+    let error = matchup(&store, &manifest, &[wind], TimeMatch::Nearest).await;
+    let error = error.unwrap_err();
+    assert_eq!(error.class(), ErrorClass::BadRequest, "{error}");
+    assert!(error.to_string().contains("go round"), "{error}");
 }

@@ -100,6 +100,7 @@ pub(crate) async fn land_each(
         derived_from: None,
         computed: None,
         notices: vec![],
+        indexes: vec![],
     };
     manifests::commit(store, &manifest).await.unwrap();
     manifest

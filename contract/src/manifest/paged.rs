@@ -10,6 +10,7 @@ use crate::ContractError;
 use crate::computed::Computed;
 use crate::digest::Digest;
 use crate::grid::Grid;
+use crate::index::DimensionIndex;
 use crate::key::ObjectKey;
 use crate::notice::NoticeRun;
 use crate::quantity::Quantity;
@@ -70,6 +71,9 @@ pub struct PagedManifest {
     /// How, if it was by an expression, by regridding, as a statistic or a correlation.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub computed: Option<Computed>,
+    /// Which index of further dimensions its files are read at.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub indexes: Vec<DimensionIndex>,
 }
 
 impl PagedManifest {
@@ -134,6 +138,7 @@ impl PagedManifest {
             series: vec![],
             derived_from: self.derived_from,
             computed: self.computed,
+            indexes: self.indexes,
         })
     }
 }
@@ -196,6 +201,7 @@ impl Manifest {
             domain: self.domain.clone(),
             derived_from: self.derived_from.clone(),
             computed: self.computed.clone(),
+            indexes: self.indexes.clone(),
         };
         Some((paged, new))
     }
@@ -246,6 +252,7 @@ mod tests {
             derived_from: Some("q@3-0a1b2c3d".parse().unwrap()),
             computed: None,
             notices: NoticeRun::of(&(0..days).map(order).collect::<Vec<_>>()),
+            indexes: vec!["depth=3".parse().unwrap()],
             product,
         }
     }

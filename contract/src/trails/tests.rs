@@ -52,6 +52,7 @@ fn product(name: &str, quantity: Quantity, days: std::ops::RangeInclusive<u32>) 
         derived_from: None,
         computed: None,
         notices: vec![],
+        indexes: vec![],
         product,
     }
 }

@@ -50,6 +50,7 @@ pub(crate) async fn version(store: &Store, grid: Grid, number: u64, steps: Steps
         derived_from: None,
         computed: None,
         notices: vec![],
+        indexes: vec![],
         product,
     }
 }

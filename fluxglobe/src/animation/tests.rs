@@ -54,6 +54,7 @@ fn product() -> Manifest {
         derived_from: None,
         computed: None,
         notices: vec![],
+        indexes: vec![],
         product,
     }
 }

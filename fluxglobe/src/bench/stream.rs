@@ -112,6 +112,7 @@ async fn send(log: &dyn EventLog, file: &std::path::Path, product: &ProductId) -
         profile: None,
         product: Some(product.clone()),
         variable: None,
+        indexes: vec![],
         sha256: None,
         size_bytes: None,
         attempt: 1,

@@ -1,6 +1,7 @@
 //! Words of `fluxglobe attach`.
 
 use clap::Args;
+use contract::index::DimensionIndex;
 use contract::product::ProductId;
 
 /// `fluxglobe attach`.
@@ -51,8 +52,8 @@ pub(crate) struct Attach {
     pub(crate) product: Option<ProductId>,
     /// Of a dimension beside time, latitude and longitude the index that is read, from 0 on: a depth, a height, a member. May
     /// be given several times.
-    #[arg(long, value_name = "DIMENSION=INDEX", value_parser = index)]
-    pub(crate) index: Vec<(String, u64)>,
+    #[arg(long, value_name = "DIMENSION=INDEX")]
+    pub(crate) index: Vec<DimensionIndex>,
     /// Where the product is attached to another store, array or index already, have this be its next version: a store that moved, say.
     /// Without it that is refused.
     #[arg(long)]
@@ -63,11 +64,4 @@ pub(crate) struct Attach {
     /// JSON instead of text.
     #[arg(long)]
     pub(crate) json: bool,
-}
-
-fn index(text: &str) -> Result<(String, u64), String> {
-    let parts = text.split_once('=').filter(|(name, _)| !name.is_empty());
-    let (name, index) = parts.ok_or("give DIMENSION=INDEX, such as depth=0")?;
-    let index = index.parse().map_err(|e| format!("{index:?}: {e}"))?;
-    Ok((name.to_owned(), index))
 }

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 use contract::digest::Digest;
+use contract::index::DimensionIndex;
 use contract::product::ProductId;
 use contract::topic::Origin;
 
@@ -105,6 +106,10 @@ pub(crate) struct Notice {
     /// Variable to land, where no profile is for the file and it holds several: any on a grid.
     #[arg(long, value_name = "NAME", conflicts_with = "profile")]
     pub(crate) variable: Option<String>,
+    /// Of a dimension beside time, latitude and longitude the index that is read, from 0 on: a depth, a height, a member. May be given
+    /// several times.
+    #[arg(long, value_name = "DIMENSION=INDEX")]
+    pub(crate) index: Vec<DimensionIndex>,
     /// SHA-256 that a fetched file must have; local files are digested here.
     #[arg(long)]
     pub(crate) sha256: Option<Digest>,

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use compute::recompute::What;
 use contract::manifest::AskedVersion;
+use contract::index::DimensionIndex;
 use contract::product::ProductId;
 use contract::time::TimeMs;
 use storage::pins;
@@ -196,4 +197,8 @@ pub(crate) struct Survey {
     /// Folders of files; each is a set.
     #[arg(required = true, value_name = "FOLDER")]
     pub(crate) folders: Vec<PathBuf>,
+    /// Of a dimension of all the files beside time, latitude and longitude the index that is read, as for `fluxglobe ingest`. May be
+    /// given several times.
+    #[arg(long, value_name = "DIMENSION=INDEX")]
+    pub(crate) index: Vec<DimensionIndex>,
 }

@@ -1,6 +1,7 @@
 //! `fluxglobe attach`: a store of others in, a product of its values out that are not copied.
 
 use anyhow::{Context as _, Result};
+use contract::index::DimensionIndex;
 use contract::masked::MaskedCells;
 use ingest::attach::{Attached, Request};
 use serde::Serialize;
@@ -39,6 +40,7 @@ pub(crate) async fn run(settings: &Settings, options: &Attach) -> Result<()> {
         // A folder is found from wherever the product is read.
         let is_url = address.contains("://");
         let path = std::path::absolute(&address).ok().filter(|_| !is_url);
+        let own = |one: &DimensionIndex| (one.dimension.clone(), one.index);
         let request = Request {
             address: match path {
                 Some(path) => path.to_str().context("the path is not UTF-8")?.to_owned(),
@@ -47,7 +49,7 @@ pub(crate) async fn run(settings: &Settings, options: &Attach) -> Result<()> {
             variable: options.variable.clone(),
             profile: options.profile.clone(),
             product: options.product.clone(),
-            indexes: options.index.clone(),
+            indexes: options.index.iter().map(own).collect(),
             replace: options.replace,
         };
         ingest::attach::attach(&store, &request, &told).await

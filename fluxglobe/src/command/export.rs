@@ -349,6 +349,7 @@ mod tests {
             derived_from: None,
             computed: None,
             notices: vec![],
+            indexes: vec![],
         };
         (store, manifest)
     }

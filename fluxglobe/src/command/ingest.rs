@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use anyhow::Result;
 use contract::event::RejectReason;
+use contract::index::DimensionIndex;
 use contract::masked::MaskedCells;
 use ingest::{IngestService, Outcome};
 use observations::FileStore;
@@ -35,6 +36,7 @@ pub(crate) async fn run(settings: &Settings, options: Ingest) -> Result<ExitCode
         profile: options.profile,
         product: options.product,
         variable: options.variable,
+        indexes: DimensionIndex::sorted(options.index)?,
     };
     service.notify_of(&files, &wishes).await?;
     let bar = LandingBar::new(files.len());

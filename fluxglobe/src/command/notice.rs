@@ -6,6 +6,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 use anyhow::{Context as _, Result};
 use contract::digest::Digest;
 use contract::event::{Body, Event};
+use contract::index::DimensionIndex;
 use contract::time::TimeMs;
 use sha2::{Digest as _, Sha256};
 use storage::log::EventLog;
@@ -54,6 +55,7 @@ fn notice(file: &str, options: &Notice, clock: &mut Clock) -> Result<Event> {
         profile: options.profile.clone(),
         product: options.product.clone(),
         variable: options.variable.clone(),
+        indexes: DimensionIndex::sorted(options.index.clone())?,
         sha256,
         size_bytes,
         attempt: 1,

@@ -4,12 +4,14 @@
 use std::path::Path;
 
 use anyhow::{Context as _, Result, ensure};
+use contract::index::DimensionIndex;
 use ingest::Row;
 
 use crate::cli::Survey;
 use crate::progress;
 
 pub(crate) async fn run(options: &Survey) -> Result<()> {
+    let indexes = DimensionIndex::sorted(options.index.clone())?;
     let settings = ingest::Settings::with_current_program()?;
     let mut files = vec![];
     for folder in &options.folders {
@@ -25,7 +27,7 @@ pub(crate) async fn run(options: &Survey) -> Result<()> {
         "there is nothing to survey: give folders of data files, or the files themselves"
     );
     let bar = progress::bar("survey", files.len() as u64);
-    let rows = ingest::survey(&files, &settings).await?;
+    let rows = ingest::survey(&files, &indexes, &settings).await?;
     bar.set_position(files.len() as u64);
     progress::done(&bar, &format!("{} files", files.len()));
     progress::result(&ingest::markdown(&rows))?;

@@ -255,6 +255,7 @@ async fn next_version(
             derived_from: None,
             computed: None,
             notices: vec![],
+            indexes: vec![],
         };
         match manifests::commit(store, &manifest).await {
             Ok(version) => {

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use contract::event::RejectReason;
+use contract::index::DimensionIndex;
 use contract::product::ProductId;
 use cube::foreign::{Absent, Foreign, Found};
 use storage::attached::Attachment;
@@ -49,7 +50,7 @@ impl Survey {
         let foreign = Arc::new(foreign.map_err(arrays::stopped)?);
         let array = foreign.array(variable).map_err(arrays::stopped)?;
         array.value_bytes().map_err(arrays::stopped)?;
-        let indexes: Indexes = request.indexes.iter().cloned().collect();
+        let (asked, indexes) = asked(&request.indexes)?;
         let description = arrays::describe(&foreign, &indexes)?;
         let fill = array.fill;
         let own = written::description(&foreign.attributes, variable).filter(|_| profile.is_none());
@@ -58,6 +59,7 @@ impl Survey {
             product: request.product.as_ref(),
             variable: Some(variable),
             meaning: own.as_ref().map(written::meaning),
+            indexes: &asked,
         };
         let is_synthetic = written::is_synthetic(&foreign.attributes);
         // What is not there is fill value: no data, if the conventions say that of it.
@@ -104,6 +106,17 @@ impl Survey {
             place,
         })
     }
+}
+
+/// The indexes that are asked for, in the order of their dimensions and by their names.
+fn asked(indexes: &[(String, u64)]) -> Result<(Vec<DimensionIndex>, Indexes), Rejection> {
+    let each = indexes.iter().map(|(dimension, index)| DimensionIndex {
+        dimension: dimension.clone(),
+        index: *index,
+    });
+    let asked = DimensionIndex::sorted(each.collect())
+        .map_err(|error| Rejection::new(RejectReason::Grid, "index", error.to_string()))?;
+    Ok((asked, indexes.iter().cloned().collect()))
 }
 
 fn attachment(

@@ -305,6 +305,7 @@ mod tests {
             derived_from: None,
             computed: None,
             notices: vec![],
+            indexes: vec![],
             product: product.clone(),
         };
         let found = write(store, &product, &GRID, Some(&newest), steps).await;

@@ -106,6 +106,7 @@ mod tests {
             derived_from: None,
             computed: None,
             notices: vec![],
+            indexes: vec![],
         };
         manifests::commit(store, &manifest).await.unwrap();
         manifest

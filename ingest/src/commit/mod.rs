@@ -162,6 +162,7 @@ async fn build(
         derived_from: None,
         computed: None,
         notices: NoticeRun::of(&merged.orders),
+        indexes: newest.map_or_else(|| reading.recipe.indexes.clone(), |m| m.indexes.clone()),
     })
 }
 

@@ -121,6 +121,7 @@ impl IngestService {
             profile: profile.map(str::to_owned),
             product: product.cloned(),
             variable: None,
+            indexes: vec![],
         };
         self.notify_of(files, &wishes).await
     }

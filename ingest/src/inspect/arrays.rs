@@ -7,6 +7,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use contract::event::RejectReason;
+use contract::index::DimensionIndex;
 use cube::foreign::{Absent, ArrayKind, Foreign, ForeignArray, ForeignError};
 use serde_json::{Map, Value};
 
@@ -14,6 +15,7 @@ use super::file::description::{
     AttributeValue, Attributes, Description, Dimension, Kind, MAX_ATTRIBUTE_NUMBERS,
     MAX_ATTRIBUTE_TEXT_BYTES, MAX_ATTRIBUTES, MAX_NAME_BYTES, Part, Variable,
 };
+use super::indexed;
 use crate::error::{IngestError, Rejection, Stop};
 
 /// Which index is read of dimensions beside time and the map, by their names.
@@ -167,18 +169,14 @@ pub(crate) fn stopped(error: ForeignError) -> Stop {
 /// # Errors
 /// There is no such dimension, or no such index.
 pub(crate) fn describe(foreign: &Foreign, indexes: &Indexes) -> Result<Description, Rejection> {
-    for (name, index) in indexes {
-        let all = foreign.arrays().flat_map(|array| &array.dimensions);
-        let lens: Vec<u64> = all
-            .filter(|(own, _)| own.as_ref() == Some(name))
-            .map(|(_, len)| *len)
-            .collect();
-        let detail = match lens.iter().min() {
-            None => "is no dimension of an array".to_owned(),
-            Some(len) if index >= len => format!("has the indexes 0 to {}", len.saturating_sub(1)),
-            Some(_) => continue,
+    for (dimension, index) in indexes {
+        let asked = DimensionIndex {
+            dimension: dimension.clone(),
+            index: *index,
         };
-        return Err(Rejection::new(RejectReason::Grid, name, detail));
+        let all = foreign.arrays().flat_map(|array| &array.dimensions);
+        let own = all.filter(|(own, _)| own.as_ref() == Some(dimension));
+        indexed::check(&asked, own.map(|(_, len)| *len), "an array")?;
     }
     Ok(Description {
         format: foreign.found.kind.to_string(),

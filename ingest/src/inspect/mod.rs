@@ -2,6 +2,7 @@
 
 pub(crate) mod arrays;
 pub(crate) mod file;
+pub(crate) mod indexed;
 pub mod reader;
 pub(crate) mod values;
 

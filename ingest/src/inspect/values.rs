@@ -4,12 +4,14 @@ use cube::foreign::ForeignError;
 
 use super::arrays::{Arrays, stopped};
 use super::file::description::Part;
+use super::indexed::Indexed;
 use super::reader::session::Session;
 use crate::error::Stop;
 
 /// Whoever gives values of what was described.
 pub(crate) enum Values {
-    Process(Box<Session>),
+    /// With the indexes that are read of further dimensions of its variables.
+    Process(Box<Session>, Indexed),
     Arrays(Arrays),
 }
 
@@ -17,7 +19,9 @@ impl Values {
     /// Says that a part of a variable will be read next but for what was asked for before: a process reads it meanwhile.
     pub(crate) async fn ask(&mut self, variable: &str, part: &[Part]) -> Result<(), Stop> {
         match self {
-            Self::Process(session) => session.ask(variable, part).await,
+            Self::Process(session, indexed) => {
+                session.ask(variable, &indexed.part(variable, part)).await
+            }
             Self::Arrays(_) => Ok(()),
         }
     }
@@ -30,7 +34,10 @@ impl Values {
         expected: u64,
     ) -> Result<Vec<f64>, Stop> {
         match self {
-            Self::Process(session) => session.read(variable, part, expected).await,
+            Self::Process(session, indexed) => {
+                let part = indexed.part(variable, part);
+                session.read(variable, &part, expected).await
+            }
             Self::Arrays(arrays) => arrays.read(variable, part, expected).await,
         }
     }
@@ -48,7 +55,7 @@ impl Values {
     pub(crate) fn unread(&self, variable: &str) -> Option<&ForeignError> {
         match self {
             // What is damaged in a file refuses the file.
-            Self::Process(_) => None,
+            Self::Process(..) => None,
             Self::Arrays(arrays) => arrays.unread(variable),
         }
     }
@@ -56,7 +63,7 @@ impl Values {
     /// Memory of the reader beside the values that are asked for, bytes.
     pub(crate) fn library_bytes(&self) -> u64 {
         match self {
-            Self::Process(session) => session.library_bytes(),
+            Self::Process(session, _) => session.library_bytes(),
             Self::Arrays(_) => 0,
         }
     }

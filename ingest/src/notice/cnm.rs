@@ -141,6 +141,7 @@ pub(super) fn notices(
                 profile: profile.cloned(),
                 product: None,
                 variable: None,
+                indexes: vec![],
             })
         };
         Said {

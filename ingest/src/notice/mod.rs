@@ -8,6 +8,7 @@ mod outcome;
 use std::path::PathBuf;
 
 use contract::event::{Body, Event, MAX_EVENT_BYTES, RejectReason};
+use contract::index::DimensionIndex;
 use contract::notice::NoticeOrder;
 use contract::product::ProductId;
 use contract::time::TimeMs;
@@ -51,6 +52,8 @@ pub(crate) struct Order {
     pub(crate) profile: Option<Profile>,
     pub(crate) product: Option<ProductId>,
     pub(crate) variable: Option<String>,
+    /// Each of another dimension, in the order of their names.
+    pub(crate) indexes: Vec<DimensionIndex>,
 }
 
 impl Order {
@@ -60,6 +63,7 @@ impl Order {
             product: self.product.as_ref(),
             variable: self.variable.as_deref(),
             meaning: None,
+            indexes: &self.indexes,
         }
     }
 }
@@ -133,6 +137,7 @@ impl Said {
             profile,
             product,
             variable,
+            indexes,
             sha256,
             size_bytes,
             attempt,
@@ -145,6 +150,7 @@ impl Said {
             .as_deref()
             .map(|name| find(name, settings))
             .transpose();
+        let indexes = DimensionIndex::sorted(indexes.clone());
         let order = || {
             Ok(Order {
                 location: location.clone()?,
@@ -156,6 +162,7 @@ impl Said {
                 profile: profile?,
                 product: product.clone(),
                 variable: variable.clone(),
+                indexes: indexes.map_err(|error| bad(&error.to_string()))?,
             })
         };
         Ok(Self {
@@ -179,6 +186,8 @@ pub struct Wishes {
     pub product: Option<ProductId>,
     /// The variable to land of files that no profile is for.
     pub variable: Option<String>,
+    /// Which index is read of dimensions beside time, latitude and longitude; files are refused where a dimension is named twice.
+    pub indexes: Vec<DimensionIndex>,
 }
 
 /// The event of a first notice.
@@ -187,12 +196,14 @@ pub(crate) fn notice_body(path: &str, wishes: &Wishes) -> Body {
         profile,
         product,
         variable,
+        indexes,
     } = wishes.clone();
     Body::GranuleNotice {
         path: path.to_owned(),
         profile,
         product,
         variable,
+        indexes,
         sha256: None,
         size_bytes: None,
         attempt: 1,

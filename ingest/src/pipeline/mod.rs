@@ -149,6 +149,7 @@ impl Pipeline<'_> {
     async fn read(&self, way: Way<'_>, raw: RawGranule, seat: Seat<'_>) -> Result<Prepared, Stop> {
         let (metrics, wish) = (self.metrics, way.order.wish());
         if let Some(format) = observation::recognise_text(&raw.head(TEXT_HEAD_BYTES).await?) {
+            no_index_of_observations(wish)?;
             let _pass = seat.with_memory(memory::of_text(raw.size_bytes)).await;
             return self.observe_text(format, raw, way).await;
         }
@@ -156,6 +157,7 @@ impl Pipeline<'_> {
         let inspected = inspect::run(raw, self.settings);
         let inspected = metrics.timed("inspect", inspected).await?;
         if wish.profile.is_none() && observation::recognise(&inspected.description).is_some() {
+            no_index_of_observations(wish)?;
             let needed = memory::of_observations(&inspected.description);
             let _pass = seat.with_memory(needed).await;
             return self.observe(inspected, way).await;
@@ -275,6 +277,16 @@ fn ended<T>(done: &Result<T, IngestError>) -> service::Outcome {
     }
 }
 
+/// Refuses observations of which an index of a dimension is asked for: all of them are read.
+fn no_index_of_observations(wish: Wish<'_>) -> Result<(), Rejection> {
+    let Some(first) = wish.indexes.first() else {
+        return Ok(());
+    };
+    let detail =
+        format!("holds observations, of which no index is chosen; give it without --index {first}");
+    Err(Rejection::new(RejectReason::Grid, "file", detail))
+}
+
 /// Is this very file in the product, or are files of later notices in all of its places? With a profile of the caller's
 /// own it is decoded all the same, since the same bytes may mean other values by it; so is one that says what codes mean where
 /// the product says nothing.
@@ -291,6 +303,7 @@ fn unchanged(
         || planned.plan.steps.is_empty()
         || joined.is_none_or(says_more)
         || newest.grid != planned.plan.mapping.grid
+        || newest.indexes != wish.indexes
     {
         return None;
     }

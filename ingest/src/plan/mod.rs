@@ -8,6 +8,7 @@ mod coverage;
 mod date;
 mod edges;
 mod flags;
+mod further;
 pub(crate) mod method;
 mod model_calendar;
 mod pairs;
@@ -23,6 +24,7 @@ pub(crate) mod unit;
 pub(crate) mod written;
 
 use contract::event::RejectReason;
+use contract::index::DimensionIndex;
 use contract::product::ProductId;
 use contract::quantity::Quantity;
 use contract::time::Period;
@@ -33,6 +35,7 @@ use crate::error::{Rejection, Stop};
 use crate::fetch::RawGranule;
 use crate::inspect::InspectedGranule;
 use crate::inspect::file::description::{Description, Part, Variable};
+use crate::inspect::indexed::Indexed;
 use crate::inspect::values::Values;
 use crate::limits::Limits;
 use crate::plan::cf::axis::Mapping;
@@ -106,6 +109,8 @@ pub(crate) struct Wish<'a> {
     pub(crate) variable: Option<&'a str>,
     /// What that variable means, where it is known beyond what it says: a cube of this program.
     pub(crate) meaning: Option<Named>,
+    /// Which index is read of dimensions beside time and the map, in the order of their names.
+    pub(crate) indexes: &'a [DimensionIndex],
 }
 
 /// A file on its way through planning.
@@ -136,7 +141,8 @@ pub(crate) async fn run(
         target::read_by(found, asked, &settings.profiles)?;
     }
     let wish = Wish { profile, ..wish };
-    let held = (Values::Process(Box::new(session)), &description);
+    let (description, indexed) = Indexed::of(description, wish.indexes)?;
+    let held = (Values::Process(Box::new(session), indexed), &description);
     let plan = plan(held, &raw.file_name, wish, settings.limits).await?;
     Ok(PlannedGranule { raw, plan })
 }
@@ -149,6 +155,7 @@ pub(crate) async fn plan(
     limits: Limits,
 ) -> Result<Plan, Stop> {
     let profile = wish.profile;
+    further::check(description, wish.indexes)?;
     let (variable, meaning, assumption) = target::choose(description, wish)?;
     let mut planning = Planning {
         values,
@@ -159,7 +166,9 @@ pub(crate) async fn plan(
         assumptions: assumption.into_iter().collect(),
         holds_always: false,
     };
+    further::check_time(description, variable, wish.indexes)?;
     let (axes, mapping) = place::mapping(&mut planning, variable).await?;
+    further::tell(&mut planning, variable, wish.indexes).await?;
     let periods = steps::periods(&mut planning, (variable, meaning.quantity), &axes).await?;
     if profile.is_none() && wish.meaning.is_none() {
         let time = planning.time_variable(&axes);

@@ -201,8 +201,8 @@ fn check_others(variable: &Variable, axes: &[Axis], is_of_a_store: bool) -> Resu
     };
     let indexes: Option<String> = deep.iter().map(index).collect();
     let advice = match indexes {
-        _ if !is_of_a_store => "give a file with one level".to_owned(),
         Some(indexes) => format!("say which is read:{indexes}"),
+        None if !is_of_a_store => "name its dimensions, as NetCDF-4 and dimension scales of HDF5 do, so that --index can say which is read, or give a file with one level".to_owned(),
         None => "name its dimensions (dimension_names, in version 2 _ARRAY_DIMENSIONS), so that --index can say which is read".to_owned(),
     };
     let levels: Vec<String> = deep.iter().map(levels).collect();

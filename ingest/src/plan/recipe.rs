@@ -1,6 +1,7 @@
 //! What a reading of a file follows from, besides the file: this program's way of decoding, and the profile.
 
 use contract::digest::Digest;
+use contract::index::DimensionIndex;
 use serde::{Deserialize, Serialize};
 
 use super::Wish;
@@ -39,6 +40,9 @@ pub(crate) struct Recipe {
     /// The variable that was asked for, of a file that no profile was for.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) variable: Option<String>,
+    /// Which index was read of dimensions beside time and the map, in the order of their names.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(crate) indexes: Vec<DimensionIndex>,
 }
 
 /// The profile that a file was read by.
@@ -63,6 +67,7 @@ impl Recipe {
             decoder: DECODER,
             profile: wish.profile.map(used),
             variable: variable.map(str::to_owned),
+            indexes: wish.indexes.to_vec(),
         }
     }
 
@@ -70,9 +75,10 @@ impl Recipe {
     pub(crate) fn input(&self, raw_sha256: Digest, file_name: &str) -> Digest {
         let rules = self.profile.as_ref().map(|used| used.rules);
         let basis = ("reading", raw_sha256, file_name, self.decoder, rules);
-        match &self.variable {
-            None => Digest::of_json(&basis),
-            Some(variable) => Digest::of_json(&(basis, variable)),
+        match (&self.variable, self.indexes.as_slice()) {
+            (None, []) => Digest::of_json(&basis),
+            (Some(variable), []) => Digest::of_json(&(basis, variable)),
+            (variable, indexes) => Digest::of_json(&(basis, variable, indexes)),
         }
     }
 }

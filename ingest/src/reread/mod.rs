@@ -14,6 +14,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use contract::digest::Digest;
+use contract::index::DimensionIndex;
 use contract::manifest::ManifestId;
 use contract::product::ProductId;
 use contract::time::{Period, TimeMs};
@@ -121,6 +122,9 @@ pub struct Plan {
     pub items: Vec<Item>,
     /// How many files are right as they are.
     pub fresh_count: usize,
+    /// The indexes of further dimensions that all of the product's files are read at.
+    #[serde(skip)]
+    indexes: Vec<DimensionIndex>,
 }
 
 impl Plan {

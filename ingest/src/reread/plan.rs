@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use contract::digest::Digest;
+use contract::index::DimensionIndex;
 use contract::key::ObjectKey;
 use contract::kind::Kind;
 use contract::manifest::{Manifest, Step};
@@ -56,6 +57,7 @@ pub async fn plan(
         manifest: manifest.id(),
         items: vec![],
         fresh_count: 0,
+        indexes: manifest.indexes.clone(),
     };
     // What was computed has no files.
     if manifest.derived_from.is_some() {
@@ -211,7 +213,8 @@ impl<'a> Known<'a> {
             by,
         };
         let input = |recipe: &Recipe| recipe.input(file.raw_sha256, file.origin);
-        let (by, wanted) = match wanted(file, readings, profiles, request)? {
+        let indexes = self.manifest.indexes.as_slice();
+        let (by, wanted) = match wanted((file, indexes), readings, profiles, request)? {
             Wanted::As(by, recipe) => (by, recipe),
             Wanted::Anyhow => return Ok(Some(item(By::Found, Reason::Missing, false))),
             Wanted::AsItIs => return Ok(None),
@@ -260,8 +263,9 @@ enum Wanted {
     AsItIs,
 }
 
+/// `indexes`: those of further dimensions at which the files of the product are read.
 fn wanted(
-    file: &File<'_>,
+    (file, indexes): (&File<'_>, &[DimensionIndex]),
     readings: &[Reading],
     profiles: &Profiles,
     request: &Request,
@@ -269,6 +273,7 @@ fn wanted(
     if let Some(profile) = &request.profile {
         let wish = Wish {
             profile: Some(profile),
+            indexes,
             ..Wish::default()
         };
         return Ok(Wanted::As(By::Given, Recipe::of(wish)));
@@ -278,6 +283,7 @@ fn wanted(
             let variable = reading.recipe.variable.clone();
             let wish = Wish {
                 variable: variable.as_deref(),
+                indexes,
                 ..Wish::default()
             };
             let recipe = Recipe::of(wish);
@@ -289,6 +295,7 @@ fn wanted(
             .map(|profile| {
                 let wish = Wish {
                     profile: Some(profile),
+                    indexes,
                     ..Wish::default()
                 };
                 (By::Named(used.name.clone()), Recipe::of(wish))

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use contract::index::DimensionIndex;
 use contract::manifest::Manifest;
 use contract::product::ProductId;
 use futures::StreamExt as _;
@@ -52,6 +53,7 @@ pub async fn run(
         raw: RawFiles::open(store, &workplace.spool, workplace.spool_bytes)?,
         product: &request.product,
         given: request.profile.as_ref(),
+        indexes: &plan.indexes,
     };
     let mut readings = Vec::with_capacity(plan.items.len());
     let mut refused = vec![];
@@ -90,6 +92,8 @@ struct Work<'a> {
     raw: RawFiles,
     product: &'a ProductId,
     given: Option<&'a Profile>,
+    /// At which all files are read.
+    indexes: &'a [DimensionIndex],
 }
 
 impl Work<'_> {
@@ -111,6 +115,7 @@ impl Work<'_> {
             product: Some(self.product),
             variable,
             meaning: None,
+            indexes: self.indexes,
         };
         if item.is_read {
             let recipe = Recipe::of(wish);

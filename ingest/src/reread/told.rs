@@ -139,6 +139,7 @@ mod tests {
             derived_from: None,
             computed: None,
             notices: vec![],
+            indexes: vec![],
         }
     }
 

@@ -341,6 +341,17 @@ async fn what_a_product_is_attached_to_is_replaced_only_where_that_is_said() {
 }
 
 #[tokio::test]
+async fn two_indexes_of_one_dimension_are_refused() {
+    let own = deep();
+    let request = Request {
+        indexes: [0, 1].map(|depth| ("depth".to_owned(), depth)).to_vec(),
+        ..request(own.path().to_str().unwrap(), "sst")
+    };
+    let error = own.ask(&request).await.unwrap_err();
+    assert!(error.contains("one index of each dimension"), "{error}");
+}
+
+#[tokio::test]
 async fn of_other_dimensions_the_same_index_is_read_again() {
     for depth in [0, 1] {
         let own = deep();

@@ -24,6 +24,7 @@ mod cubes;
 mod damaged;
 mod faults;
 mod fixture;
+mod further;
 mod guarded;
 mod half_floats;
 mod hostile;

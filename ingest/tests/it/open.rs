@@ -437,13 +437,25 @@ async fn meanings_that_cannot_be_kept_are_left_out_and_that_is_said() {
 }
 
 #[tokio::test]
-async fn what_cannot_be_right_is_refused_with_its_reason() {
-    let direction = variable("dir", 2)
+async fn directions_land_as_what_they_are() {
+    let place = Place::new();
+    let direction = Made {
+        values: Values::Floats((0..64).map(|cell| 5.0 * cell as f32).collect()),
+        ..variable("dir", 2)
+    };
+    let direction = direction
         .text("standard_name", "wind_from_direction")
-        .text("units", "degree");
-    let said = refused(&MadeFile::days(2).with(direction)).await;
-    assert!(said.contains("northward"), "{said}");
+        .text("units", "degrees_true");
+    let outcome = land(&place, &MadeFile::days(2).with(direction)).await;
+    assert!(!outcome.is_rejected(), "{outcome}");
+    let manifest = place.newest("dir").await;
+    assert!(manifest.quantity.is_direction());
+    assert_eq!(manifest.quantity.unit(), "degree");
+    assert_eq!(place.values(&manifest, 1).await[31], 315.0);
+}
 
+#[tokio::test]
+async fn what_cannot_be_right_is_refused_with_its_reason() {
     let mut unmarked = river(2);
     let Values::Floats(cells) = &mut unmarked.values else {
         panic!()

@@ -16,7 +16,7 @@ async fn a_survey_tells_of_each_data_file_and_keeps_nothing() {
     std::fs::write(place.path("set-b/bad.nc"), "no").unwrap();
     std::fs::write(place.path("set-b/README.txt"), "read me").unwrap();
     let files = data_files(place.folder.path()).unwrap();
-    let rows = survey(&files, &settings()).await.unwrap();
+    let rows = survey(&files, &[], &settings()).await.unwrap();
     let told: Vec<(&str, &str, bool)> = rows
         .iter()
         .map(|row| {

@@ -26,6 +26,7 @@ pub(crate) fn notice_of(path: &str, product: Option<&str>) -> Event {
         profile: None,
         product: product.map(|product| product.parse().unwrap()),
         variable: None,
+        indexes: vec![],
         sha256: None,
         size_bytes: None,
         attempt: 1,

@@ -143,6 +143,7 @@ mod tests {
             derived_from: None,
             computed: None,
             notices: vec![],
+            indexes: vec![],
             product,
         }
     }

@@ -82,6 +82,7 @@ async fn every_job_is_stored_and_told_of_once_and_failures_say_why() {
             profile: None,
             product: None,
             variable: None,
+            indexes: vec![],
             sha256: None,
             size_bytes: None,
             attempt: 1,

@@ -58,6 +58,7 @@ pub(crate) async fn product(
         derived_from: None,
         computed: None,
         notices: vec![],
+        indexes: vec![],
     };
     storage::manifests::commit(store, &manifest).await.unwrap();
     manifest

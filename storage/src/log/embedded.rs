@@ -411,6 +411,7 @@ mod tests {
             profile: None,
             product: None,
             variable: None,
+            indexes: vec![],
             sha256: None,
             size_bytes: None,
             attempt: 1,

@@ -61,6 +61,7 @@ async fn store() -> Store {
         derived_from: None,
         computed: None,
         notices: vec![],
+        indexes: vec![],
     };
     manifests::commit(&store, &manifest).await.unwrap();
     put_others(&store, &product, raw_sha256, period).await;

@@ -213,6 +213,7 @@ async fn write(store: &Store) -> Manifest {
         derived_from: None,
         computed: None,
         notices: vec![],
+        indexes: vec![],
     };
     manifests::commit(store, &manifest).await.unwrap();
     let because = Some(BECAUSE.to_owned());

@@ -141,6 +141,7 @@ fn manifest(product: &ProductId, number: u64, title: &str) -> Manifest {
         derived_from: None,
         computed: None,
         notices: vec![],
+        indexes: vec![],
     }
 }
 

@@ -233,6 +233,7 @@ impl TestApp {
             derived_from,
             computed: None,
             notices: vec![],
+            indexes: vec![],
             product,
         };
         manifests::commit(&self.store, &manifest).await.unwrap();

@@ -291,6 +291,7 @@ async fn attached(store: &Store, product: &str, place: &str) {
         derived_from: None,
         computed: None,
         notices: vec![],
+        indexes: vec![],
         product,
     };
     manifests::commit(store, &manifest).await.unwrap();

@@ -41,6 +41,7 @@ fn input(name: &str, grid: Grid, periods: &[Period], matching: Matching) -> Inpu
             derived_from: None,
             computed: None,
             notices: vec![],
+            indexes: vec![],
         },
     }
 }

@@ -305,6 +305,7 @@ impl Landing<'_> {
             derived_from: Some(source.id()),
             computed: Some(plan.computed.clone()),
             notices: vec![],
+            indexes: vec![],
         })
     }
 

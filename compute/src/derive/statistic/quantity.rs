@@ -5,6 +5,8 @@ use contract::analysis::CorrelationStatistic;
 use contract::analysis::MapStatistic;
 use contract::quantity::{MAX_TITLE_BYTES, Quantity};
 
+use crate::summed::{GO_ROUND, PARTS};
+
 /// Years in a decade.
 const DECADE: f64 = 10.0;
 
@@ -13,13 +15,14 @@ const DECADE: f64 = 10.0;
 /// that of the other one.
 ///
 /// # Errors
-/// A statistic of codes that takes a mean: that of two is the code of something else.
+/// A statistic of codes that takes a mean: that of two is the code of something else. One of directions that takes a mean or an extreme.
 pub(super) fn of(
     own: Quantity,
     second: Option<Quantity>,
     statistic: MapStatistic,
 ) -> Result<(Quantity, f64), ContractError> {
     check_codes([Some(own), second], statistic)?;
+    check_directions([Some(own), second], statistic)?;
     let display = own.display();
     let unit = plain_unit(display.unit);
     let (word, unit, says, factor) = match statistic {
@@ -97,6 +100,24 @@ fn check_codes(of: [Option<Quantity>; 2], statistic: MapStatistic) -> Result<(),
         "{} holds codes, which have none: there are count, coverage, min, max, percentiles, min-time and max-time of them, and any of the share of a \
          code, which fluxglobe derive --expr \"CASE WHEN code = 1 THEN 1 ELSE 0 END\" makes",
         codes.title()
+    );
+    let asked = statistic.to_string();
+    Err(ContractError::invalid("statistic", &asked, reason))
+}
+
+/// Directions go round: of them there are numbers of values alone.
+fn check_directions(
+    of: [Option<Quantity>; 2],
+    statistic: MapStatistic,
+) -> Result<(), ContractError> {
+    let counts = matches!(statistic, MapStatistic::Count | MapStatistic::Coverage);
+    let found = of.into_iter().flatten().find(|own| own.is_direction());
+    let Some(direction) = found.filter(|_| !counts) else {
+        return Ok(());
+    };
+    let reason = format!(
+        "{} holds {GO_ROUND}: there are count and coverage of them, and any of the parts: {PARTS}",
+        direction.title()
     );
     let asked = statistic.to_string();
     Err(ContractError::invalid("statistic", &asked, reason))
@@ -265,6 +286,23 @@ mod tests {
         let refused = super::of(Quantity::WindSpeed, Some(codes), coefficient);
         let refused = refused.unwrap_err().to_string();
         assert!(refused.contains("Kind of ice holds codes"), "{refused}");
+    }
+
+    #[test]
+    fn directions_are_counted_and_nothing_else() {
+        let wind = Quantity::open("wind_from_direction", "degree", "Wind direction").unwrap();
+        for statistic in MapStatistic::ALL {
+            let counts = matches!(statistic, MapStatistic::Count | MapStatistic::Coverage);
+            for (own, second) in [(wind, None), (Quantity::WindSpeed, Some(wind))] {
+                match super::of(own, second, statistic) {
+                    Ok(_) => assert!(counts, "{statistic}"),
+                    Err(refused) => {
+                        let refused = refused.to_string();
+                        assert!(!counts && refused.contains("go round"), "{refused}");
+                    }
+                }
+            }
+        }
     }
 
     #[test]

@@ -53,6 +53,7 @@ fn product(name: &str, quantity: Quantity, periods: Vec<Period>) -> Manifest {
         derived_from: None,
         computed: None,
         notices: vec![],
+        indexes: vec![],
         product,
     }
 }

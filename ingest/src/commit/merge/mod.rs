@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use contract::event::RejectReason;
 use contract::grid::Grid;
+use contract::index::DimensionIndex;
 use contract::manifest::{Manifest, Step};
 use contract::notice::NoticeOrder;
 use contract::quantity::Quantity;
@@ -107,13 +108,17 @@ pub(super) fn merge(
         quantity: newest.map(|m| m.quantity),
     };
     for (index, granule) in granules.iter().enumerate() {
-        let base = newest.map(|m| (m.grid, m.synthetic)).or_else(|| {
-            let first = &granules.get(merged.last_taken?)?.reading;
-            Some((first.grid, first.synthetic))
-        });
+        let base = newest
+            .map(|m| (m.grid, m.synthetic, &m.indexes))
+            .or_else(|| {
+                let first = &granules.get(merged.last_taken?)?.reading;
+                Some((first.grid, first.synthetic, &first.recipe.indexes))
+            });
         let base = base.zip(merged.quantity);
         let fits = base.map_or(Ok(granule.reading.quantity), |base| {
-            check_fits(granule, base)
+            let ((grid, synthetic, indexes), quantity) = base;
+            check_indexes(granule, indexes)?;
+            check_fits(granule, ((grid, synthetic), quantity))
         });
         let (change, quantity) = match fits {
             Ok(quantity) => {
@@ -156,6 +161,26 @@ fn told_anew(
 
 fn conflict(detail: String) -> Rejection {
     Rejection::new(RejectReason::Conflict, "product", detail)
+}
+
+/// Refuses a file that is read at another index of its further dimensions than those of the product: another depth is another map.
+fn check_indexes(granule: &StoredGranule, there: &[DimensionIndex]) -> Result<(), Rejection> {
+    let StoredGranule {
+        product, reading, ..
+    } = granule;
+    let own = reading.recipe.indexes.as_slice();
+    if own == there {
+        return Ok(());
+    }
+    let words = |indexes: &[DimensionIndex]| match indexes {
+        [] => " without --index".to_owned(),
+        some => format!(" with{}", DimensionIndex::words(some)),
+    };
+    Err(conflict(format!(
+        "{product} is of files that were read{}, this one is read{}; land it in a product of its own (--product)",
+        words(there),
+        words(own)
+    )))
 }
 
 /// What the product holds with the file, which is of its grid and quantity.

@@ -64,6 +64,7 @@ fn manifest(steps: Vec<Step>) -> Manifest {
         derived_from: None,
         computed: None,
         notices: vec![],
+        indexes: vec![],
     }
 }
 

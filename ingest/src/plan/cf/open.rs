@@ -3,13 +3,16 @@
 
 use contract::event::RejectReason;
 use contract::quantity::{
-    MAX_NAME_BYTES, MAX_TITLE_BYTES, MAX_UNIT_BYTES, OpenQuantity, OpenWords, Quantity,
+    DIRECTION_WORDS, MAX_NAME_BYTES, MAX_TITLE_BYTES, MAX_UNIT_BYTES, OpenQuantity, OpenWords,
+    Quantity, units_per_turn,
 };
 
 use crate::error::Rejection;
 use crate::inspect::file::description::Variable;
 use crate::plan::unit;
 
+/// The unit of directions, so that files of one product need not spell it alike.
+const DEGREE: &str = "degree";
 /// Words of things that stay as they are: masks and regions, relief, sizes of cells.
 const FIXED_WORDS: [&str; 17] = [
     "mask",
@@ -52,15 +55,22 @@ pub(crate) fn quantity(variable: &Variable) -> Result<Quantity, Rejection> {
         return refused(RejectReason::NoVariable, detail.to_owned());
     };
     let spelling = stated_unit(variable).unwrap_or("1");
-    if is_direction(&name, spelling) {
-        let detail = "is a direction, and the mean of 350 and 10 degrees would be 180; give its eastward and northward components";
-        return refused(RejectReason::Values, detail.to_owned());
+    let is_direction = is_direction(&name, spelling);
+    if is_direction && units_per_turn(spelling).is_none() {
+        let detail = format!(
+            "is a direction in {spelling:?}, which is no angle that is read; give it in degree"
+        );
+        return refused(RejectReason::Unit, detail);
     }
     let title =
         text("long_name").map_or_else(|| name.replace('_', " "), |long| cut(long, MAX_TITLE_BYTES));
     let words = OpenWords {
-        unit: unit::canonical(spelling)
-            .map_or_else(|| cut(spelling, MAX_UNIT_BYTES), |(unit, _)| unit),
+        unit: if is_direction {
+            DEGREE.to_owned()
+        } else {
+            unit::canonical(spelling)
+                .map_or_else(|| cut(spelling, MAX_UNIT_BYTES), |(unit, _)| unit)
+        },
         title,
         range: None,
         flags: vec![],
@@ -102,9 +112,10 @@ pub(crate) fn is_fixed(quantity: Quantity) -> bool {
     }
 }
 
+/// Is it where something comes from or goes to, in degrees, however these are spelt?
 fn is_direction(name: &str, unit: &str) -> bool {
-    let words = ["direction", "azimuth", "bearing", "heading"];
-    name.split('_').any(|word| words.contains(&word)) && unit.to_ascii_lowercase().contains("deg")
+    let is_one = |word: &str| DIRECTION_WORDS.contains(&word);
+    name.split('_').any(is_one) && (unit == "°" || unit.to_ascii_lowercase().contains("deg"))
 }
 
 /// `Sea Surface Temp. (day)` as `sea_surface_temp_day`, and the `₂` of `CO₂` as the digit it is; none if no letter is in it.
@@ -223,22 +234,20 @@ mod tests {
     }
 
     #[test]
-    fn directions_are_refused_and_speeds_are_not() {
-        let said = quantity(&variable(
-            "d",
-            &[
-                ("standard_name", "wind_from_direction"),
-                ("units", "degree"),
-            ],
-        ));
-        assert!(said.unwrap_err().to_string().contains("northward"));
-        assert!(
-            quantity(&variable(
-                "d",
-                &[("long_name", "direction code"), ("units", "1")]
-            ))
-            .is_ok()
-        );
+    fn directions_are_what_they_are_in_degrees_however_these_are_spelt() {
+        let of = |unit: &str| {
+            let named = ("standard_name", "wind_from_direction");
+            quantity(&variable("d", &[named, ("units", unit)]))
+        };
+        for spelling in ["degree", "degrees", "Degrees_true", "deg", "°"] {
+            let wind = of(spelling).unwrap();
+            assert!(wind.is_direction(), "{spelling}");
+            assert_eq!(wind.unit(), "degree", "{spelling}");
+        }
+        let refused = of("degrees clockwise from north").unwrap_err();
+        assert!(refused.to_string().contains("no angle"), "{refused}");
+        let code = [("long_name", "direction code"), ("units", "1")];
+        assert!(!quantity(&variable("d", &code)).unwrap().is_direction());
     }
 
     #[test]

@@ -53,6 +53,7 @@ fn noted() -> Reading {
                 rules: Digest::of(b"what it says"),
             }),
             variable: None,
+            indexes: vec![],
         },
         title: "Frozen flux".to_owned(),
         source: "made by a test".to_owned(),

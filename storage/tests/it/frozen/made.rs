@@ -50,6 +50,7 @@ fn made(name: &str, quantity: Quantity, computed: Computed) -> Manifest {
         derived_from: computed.inputs.first().map(|it| it.manifest.clone()),
         computed: Some(computed),
         notices: vec![],
+        indexes: vec![],
         product,
     }
 }

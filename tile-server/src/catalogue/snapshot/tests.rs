@@ -33,6 +33,7 @@ async fn publish(store: &Store, product: &str, number: u64) {
         derived_from: None,
         computed: None,
         notices: vec![],
+        indexes: vec![],
         product,
     };
     manifests::commit(store, &manifest).await.unwrap();

@@ -79,6 +79,7 @@ async fn published(store: &Store, quantity: Quantity) -> Manifest {
         derived_from: None,
         computed: None,
         notices: vec![],
+        indexes: vec![],
         product: product.clone(),
     };
     manifests::commit(store, &manifest).await.unwrap();
