@@ -4,11 +4,12 @@ import { el } from "../page/dom";
 import { alikeText, chemistry, numberText, unitText } from "../page/format";
 
 export function drawCheck(body: HTMLElement, check: Check): void {
-  const head = ["What", "Paper", "Independent", "Fluxglobe", "Against the paper"].map((title, column) =>
-    el("th", { scope: "col", class: column > 0 && column < 4 ? "number" : "" }, title),
+  const head = ["What", "Paper", "Independent", "Fluxglobe"].map((title, column) =>
+    el("th", { scope: "col", class: column > 0 ? "number" : "" }, title),
   );
   const largest = largestByUnit(check.rows);
   const rows = check.rows.map((row) => rowView(row, largest.get(row.unit) ?? 0));
+  // Five columns are wider than the card: how ours lies to the paper stands below what it is.
   body.replaceChildren(
     el("p", { class: "muted" }, "Budgets by three hands, positive out of the sea."),
     el(
@@ -52,6 +53,7 @@ export function verdictText(row: CheckRow): string {
 }
 
 function rowView(row: CheckRow, largest: number): HTMLElement {
+  const verdict = verdictText(row);
   return el(
     "tr",
     {},
@@ -60,10 +62,10 @@ function rowView(row: CheckRow, largest: number): HTMLElement {
       { scope: "row" },
       chemistry(row.what),
       el("span", { class: "period" }, `${row.period}, ${unitText(row.unit)}`),
+      verdict === "" ? null : el("span", { class: "period" }, row.paper ? `against the paper: ${verdict}` : verdict),
     ),
     el("td", { class: "number" }, statedText(row.paper)),
     el("td", { class: "number" }, alikeText(row.independent, largest)),
     el("td", { class: "number" }, alikeText(row.ours, largest)),
-    el("td", {}, verdictText(row)),
   );
 }
