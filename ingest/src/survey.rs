@@ -117,6 +117,10 @@ fn name_of(file: &Path) -> String {
 
 /// The last parts of a folder's path that tell it from the others; a year alone is no name.
 fn set_name(folder: &Path, folders: &[&Path]) -> String {
+    // That of a name alone, without a folder before it.
+    if folder.as_os_str().is_empty() {
+        return ".".to_owned();
+    }
     let parts: Vec<_> = folder.components().collect();
     let name = |parts: &[std::path::Component<'_>]| parts.iter().collect::<PathBuf>();
     for first in (0..parts.len()).rev() {
@@ -210,6 +214,7 @@ mod tests {
         let folders = ["/a/SST/2010", "/a/wind/2010", "/a/ice/2011", "/a/x"].map(Path::new);
         let names = folders.map(|folder| set_name(folder, &folders));
         assert_eq!(names, ["SST/2010", "wind/2010", "ice/2011", "x"]);
+        assert_eq!(set_name(Path::new(""), &[Path::new("")]), ".");
     }
 
     #[test]

@@ -127,8 +127,8 @@ impl ErrorWords<'_> {
             };
         };
         let Some(length_km) = self.correlation_length_km else {
-            let reason = "how far do errors go together? Give the correlation length in km; 0 if each cell's is its own";
-            return Err(ContractError::invalid("error", error, reason));
+            let reason = "how far do errors go together? Give it beside the error, in km (--correlation-length-km, correlation_length_km=); 0 if each cell's is its own";
+            return Err(ContractError::invalid("correlation length", "", reason));
         };
         let within = |what, value: f64, most: f64, unit: &str| {
             if (0.0..=most).contains(&value) {

@@ -22,7 +22,7 @@ const SAME_STEP: i64 = 5;
 /// Coverage of whole days to within this that begins an hour or more from midnight is that of days of its own.
 const EXACT_MS: i64 = 60_000;
 
-const ONE_STAMP: &str = "has one stamp and no bounds, so nothing says what it covers; say in a profile (covers = \"month\", say)";
+const ONE_STAMP: &str = "has one stamp and no bounds, so nothing says what it covers; say in a profile, such as [time] covers = \"month\", from = { variable = { name = \"time\" } }";
 const NO_TIME: &str = "has no time axis and no attribute that says its period; say in a profile where the time comes from";
 
 /// What the attributes of a file say.

@@ -10,6 +10,7 @@ import {
   lonText,
   numberText,
   titleText,
+  titleTexts,
   unitText,
   valueText,
   wrapLon,
@@ -103,5 +104,11 @@ describe("titles", () => {
     expect(titleText({ title: "CO2 flux", synthetic: false })).toBe("CO₂ flux");
     expect(titleText({ title: "CO2 flux", synthetic: true })).toBe("CO₂ flux (synthetic)");
     expect(titleText({ title: "SYNTHETIC China Sea", synthetic: true })).toBe("SYNTHETIC China Sea");
+  });
+
+  it("tell products of one title apart by their names", () => {
+    const product = (name: string, title: string) => ({ product: name, title, synthetic: false });
+    const told = titleTexts([product("a", "CO2 flux"), product("b", "Wind"), product("c", "CO2 flux")]);
+    expect(told).toEqual(["CO₂ flux (a)", "Wind", "CO₂ flux (c)"]);
   });
 });

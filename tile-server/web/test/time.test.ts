@@ -6,6 +6,7 @@ import {
   formatInstant,
   instantAt,
   isOutside,
+  labelledEvery,
   nextInstant,
   outsideText,
   parseSteps,
@@ -165,6 +166,16 @@ describe("texts", () => {
   it("write instants in UTC", () => {
     expect(formatInstant(at("2000-07-04T05:06:00Z"))).toBe("4 Jul 2000, 05:06 UTC");
     expect(toIso(at("2000-07-04T05:06:07.900Z"))).toBe("2000-07-04T05:06:07Z");
+  });
+
+  it("name the same months each year where not every step has one", () => {
+    const months = Array.from({ length: 24 }, (_, i) => {
+      const [startMs, endMs] = [Date.UTC(2000, i), Date.UTC(2000, i + 1)];
+      return { startMs, endMs, atMs: (startMs + endMs) / 2 };
+    });
+    expect([1, 2, 5, 7, 12, 33].map((least) => labelledEvery(least, months))).toEqual([1, 2, 6, 12, 12, 36]);
+    const day = { startMs: 0, endMs: 86_400_000, atMs: 43_200_000 };
+    expect([0, 5, 33].map((least) => labelledEvery(least, [day]))).toEqual([1, 5, 33]);
   });
 
   it("label a step by its length", () => {

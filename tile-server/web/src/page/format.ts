@@ -114,3 +114,13 @@ export function titleText(product: { title: string; synthetic: boolean }): strin
   const says = /synthetic/i.test(product.title);
   return chemistry(product.title) + (product.synthetic && !says ? " (synthetic)" : "");
 }
+
+/** Titles of a list: products of one title, as of files that say the same of themselves, are told apart by their names. */
+export function titleTexts(products: readonly { product: string; title: string; synthetic: boolean }[]): string[] {
+  const titles = products.map(titleText);
+  const isAlone = (title: string): boolean => titles.filter((other) => other === title).length === 1;
+  return products.map(({ product }, index) => {
+    const title = titles[index] ?? product;
+    return isAlone(title) ? title : `${title} (${product})`;
+  });
+}

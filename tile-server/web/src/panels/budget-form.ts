@@ -6,6 +6,7 @@ import { PENCIL } from "../page/icons";
 import { type Step, stepLabel, toIso } from "../time/steps";
 
 const BOX = "box";
+const ALL_SEAS = "All seas";
 
 export interface BudgetFormContext {
   /** Step, earth or period changed. */
@@ -88,7 +89,7 @@ export class BudgetForm {
     this.#regions = regions;
     const named = regions.filter((region) => region.name !== "global");
     this.#region.replaceChildren(
-      el("option", { value: "global" }, regions.find((region) => region.name === "global")?.title ?? "All seas"),
+      el("option", { value: "global" }, this.titleOf("global")),
       ...named.map((region) => el("option", { value: region.name }, region.title)),
       el("option", { value: BOX }, "A box …"),
     );
@@ -131,6 +132,12 @@ export class BudgetForm {
     if (typeof box !== "string") return box;
     if (region === "global") return null;
     return this.#regions.find((known) => known.name === region)?.bounds_deg ?? null;
+  }
+
+  /** What a region is called: that in sight may be another one than the field says while a box is typed. */
+  titleOf(region: string): string {
+    const known = this.#regions.find(({ name }) => name === region);
+    return known?.title ?? (region === "global" ? ALL_SEAS : region);
   }
 
   /** Undefined while the period is empty or there are no steps. */

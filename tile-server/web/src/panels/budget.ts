@@ -171,7 +171,7 @@ export class BudgetPanel {
       el(
         "p",
         { class: "muted" },
-        `${row.start.slice(0, 10)} to ${row.end.slice(0, 10)}. `,
+        `${this.#form.titleOf(total.region)}, ${row.start.slice(0, 10)} to ${row.end.slice(0, 10)}. `,
         isCarbon ? "Negative: the sea takes carbon up." : null,
       ),
       el(

@@ -12,6 +12,8 @@ const OUT = "#f2906b";
 const IN = "#4aa8e0";
 const FONT = "11px system-ui, -apple-system, 'Segoe UI', Roboto, 'Liberation Sans', sans-serif";
 const HEIGHT_PX = 210;
+/** Of more values dots lie over each other and hide the line. */
+const MOST_DOTS = 60;
 
 export interface TimeRange {
   readonly startMs: number;
@@ -42,7 +44,15 @@ export function seriesChart(
         stroke: LINE,
         width: 2,
         spanGaps: false,
-        points: { show: true, size: 6, fill: LINE, stroke: "#0b1f2f", width: 1 },
+        points: {
+          show: samples.length <= MOST_DOTS,
+          // Between two gaps there is no line to see.
+          filter: (_plot, _series, isShown) => (isShown ? null : lonelyOf(samples)),
+          size: 6,
+          fill: LINE,
+          stroke: "#0b1f2f",
+          width: 1,
+        },
       },
     ],
     hooks: { drawAxes: [(plot) => zeroLine(plot)], draw: [(plot) => nowLine(plot, now)] },
@@ -158,6 +168,12 @@ function paddedWithZero(_plot: uPlot, low: number | null, high: number | null): 
   const top = Math.max(0, high ?? 0);
   const pad = (top - bottom) * 0.06 || 1;
   return [bottom === 0 ? 0 : bottom - pad, top === 0 ? 0 : top + pad];
+}
+
+/** Which values have none beside them. */
+export function lonelyOf(samples: readonly Sample[]): number[] {
+  const isThere = (index: number): boolean => typeof samples[index]?.value === "number";
+  return [...samples.keys()].filter((index) => isThere(index) && !isThere(index - 1) && !isThere(index + 1));
 }
 
 function zeroLine(plot: uPlot): void {

@@ -4,9 +4,7 @@ import { el } from "../page/dom";
 import { alikeText, chemistry, numberText, unitText } from "../page/format";
 
 export function drawCheck(body: HTMLElement, check: Check): void {
-  const head = ["What", "Paper", "Independent", "Fluxglobe", "Against the paper"].map((title, column) =>
-    el("th", { scope: "col", class: column > 0 && column < 4 ? "number" : "" }, title),
-  );
+  const head = ["Paper", "Independent", "Fluxglobe"].map((title) => el("th", { scope: "col", class: "number" }, title));
   const largest = largestByUnit(check.rows);
   const rows = check.rows.map((row) => rowView(row, largest.get(row.unit) ?? 0));
   body.replaceChildren(
@@ -14,7 +12,7 @@ export function drawCheck(body: HTMLElement, check: Check): void {
     el(
       "div",
       { class: "table-scroll" },
-      el("table", { id: "check-table" }, el("thead", {}, el("tr", {}, ...head)), el("tbody", {}, ...rows)),
+      el("table", { id: "check-table" }, el("thead", {}, el("tr", {}, ...head)), ...rows),
     ),
     el("p", { class: "muted" }, "Paper: ", chemistry(check.note)),
     el("p", { class: "muted" }, chemistry(check.method)),
@@ -51,19 +49,16 @@ export function verdictText(row: CheckRow): string {
   return texts.join("; ");
 }
 
+/** What it is has a line of its own: beside three numbers there is no room for it. */
 function rowView(row: CheckRow, largest: number): HTMLElement {
-  return el(
-    "tr",
-    {},
-    el(
-      "th",
-      { scope: "row" },
-      chemistry(row.what),
-      el("span", { class: "period" }, `${row.period}, ${unitText(row.unit)}`),
-    ),
-    el("td", { class: "number" }, statedText(row.paper)),
-    el("td", { class: "number" }, alikeText(row.independent, largest)),
-    el("td", { class: "number" }, alikeText(row.ours, largest)),
-    el("td", {}, verdictText(row)),
+  const verdict = verdictText(row);
+  const words = [`${row.period}, ${unitText(row.unit)}`, row.paper ? `against the paper: ${verdict}` : verdict];
+  const what = el(
+    "th",
+    { scope: "rowgroup", colspan: "3" },
+    chemistry(row.what),
+    el("span", { class: "period" }, words.filter((word) => word !== "").join("; ")),
   );
+  const numbers = [statedText(row.paper), alikeText(row.independent, largest), alikeText(row.ours, largest)];
+  return el("tbody", {}, el("tr", {}, what), el("tr", {}, ...numbers.map((text) => el("td", { class: "number" }, text))));
 }

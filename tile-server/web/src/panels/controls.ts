@@ -4,7 +4,7 @@ import { MODES } from "../api/words";
 import type { TileCounts } from "../globe/tiles";
 import { withoutColours } from "../look/look";
 import { el, icon } from "../page/dom";
-import { chemistry, titleText } from "../page/format";
+import { chemistry, titleTexts } from "../page/format";
 import { PICTURE } from "../page/icons";
 import type { Store } from "../state/store";
 
@@ -73,10 +73,9 @@ export class Controls {
   }
 
   setProducts(products: readonly Product[]): void {
+    const titles = titleTexts(products);
     this.#product.replaceChildren(
-      ...products.map((product) =>
-        el("option", { value: product.product }, titleText(product)),
-      ),
+      ...products.map(({ product }, index) => el("option", { value: product, title: product }, titles[index] ?? product)),
     );
   }
 

@@ -7,7 +7,7 @@ import { isRaised } from "./view";
 
 export class LiveSwitch {
   constructor(container: HTMLElement, store: Store, live: Live) {
-    const box = toggle("live", "Live volume", (isOn) => store.set({ live: isOn }));
+    const box = toggle("live", "Live picture", (isOn) => store.set({ live: isOn }));
     const word = el("span", { class: "muted", id: "live-status", role: "status" });
     box.element.append(word);
     box.element.title = "The server draws what you look at while you move. Press f to see how fast.";

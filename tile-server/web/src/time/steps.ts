@@ -162,6 +162,16 @@ export function stepLabel({ startMs, endMs }: Step): string {
   return fromTo(day(start), day(last));
 }
 
+/** Of how many steps one is labelled where room is for one in `least`: of months such that labels name the same months each year. */
+export function labelledEvery(least: number, steps: readonly Step[]): number {
+  const areMonths = steps.every(({ startMs, endMs }) => {
+    const days = (endMs - startMs) / DAY_MS;
+    return days >= 27 && days <= 31;
+  });
+  if (!areMonths || least <= 1) return Math.max(1, least);
+  return [2, 3, 4, 6].find((months) => months >= least) ?? Math.ceil(least / 12) * 12;
+}
+
 /** `5–12 Jan 2002`: what both have at their ends is said once. */
 function fromTo(from: readonly string[], to: readonly string[]): string {
   let own = from.length;

@@ -6,6 +6,7 @@ import {
   clampToRange,
   formatInstant,
   instantAt,
+  labelledEvery,
   PARTS_PER_STEP,
   positionOf,
   quantise,
@@ -171,7 +172,7 @@ export class Timeline {
     const labels = this.#steps.map(stepLabel);
     const longest = labels.reduce((most, { length }) => Math.max(most, length), 0);
     const labelWidth = Math.max(LABEL_WIDTH_PX, longest * LETTER_WIDTH_PX);
-    const every = Math.max(1, Math.ceil(count / Math.max(1, Math.floor(width / labelWidth))));
+    const every = labelledEvery(Math.ceil(count / Math.max(1, Math.floor(width / labelWidth))), this.#steps);
     this.#ticks.replaceChildren();
     labels.forEach((label, index) => {
       const isLabelled = index % every === 0;
