@@ -7,7 +7,7 @@ use half::f16;
 use icechunk::session::Session;
 use serde_json::{Map, Value};
 use tokio::sync::RwLock;
-use zarrs::array::{Array, ArrayMetadata, AsyncArrayShardedReadableExtCache, FillValueMetadata};
+use zarrs::array::{Array, ArrayMetadata, FillValueMetadata};
 use zarrs::plugin::ExtensionName as _;
 use zarrs::storage::AsyncReadableStorageTraits;
 
@@ -67,8 +67,6 @@ pub struct ForeignArray {
     /// Of a repository: tells where a chunk lies.
     session: Option<Arc<RwLock<Session>>>,
     pub(super) inner: Array<dyn AsyncReadableStorageTraits>,
-    /// Indexes of shards.
-    pub(super) shards: AsyncArrayShardedReadableExtCache,
 }
 
 impl ForeignArray {
@@ -107,7 +105,6 @@ impl ForeignArray {
             fill: number(kind, fill).filter(|_| is_filled),
             attributes,
             is_zarr2,
-            shards: AsyncArrayShardedReadableExtCache::new(&inner),
             place,
             failures: Arc::clone(failures),
             session: None,
@@ -271,5 +268,13 @@ impl std::fmt::Debug for ForeignArray {
 /// Index of a chunk, and the cells that it holds.
 pub(super) type ChunkCells = (Vec<u64>, Vec<Range<u64>>);
 
+/// A chunk, unpacked.
+pub(super) struct Chunk {
+    /// Its values, row-major.
+    pub(super) bytes: Vec<u8>,
+    /// Which of them no chunk of a shard holds, where they are filled in; empty if none are, or they were not looked for.
+    pub(super) lacking: Vec<bool>,
+}
+
 /// Chunks, shared.
-pub(super) type Unpacked = Option<Arc<Vec<u8>>>;
+pub(super) type Unpacked = Option<Arc<Chunk>>;
