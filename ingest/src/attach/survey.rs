@@ -49,7 +49,7 @@ impl Survey {
         let foreign = Arc::new(foreign.map_err(arrays::stopped)?);
         let array = foreign.array(variable).map_err(arrays::stopped)?;
         array.value_bytes().map_err(arrays::stopped)?;
-        let indexes: Indexes = request.indexes.iter().cloned().collect();
+        let indexes = indexes(request)?;
         let description = arrays::describe(&foreign, &indexes)?;
         let fill = array.fill;
         let own = written::description(&foreign.attributes, variable).filter(|_| profile.is_none());
@@ -104,6 +104,19 @@ impl Survey {
             place,
         })
     }
+}
+
+/// The indexes of a request, one a dimension.
+fn indexes(request: &Request) -> Result<Indexes, Rejection> {
+    let mut all = Indexes::new();
+    for (name, index) in &request.indexes {
+        let before = all.insert(name.clone(), *index);
+        if let Some(before) = before.filter(|before| before != index) {
+            let detail = format!("is to be read at the index {before} and at {index}; say one");
+            return Err(Rejection::new(RejectReason::Grid, name, detail));
+        }
+    }
+    Ok(all)
 }
 
 fn attachment(

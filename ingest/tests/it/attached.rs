@@ -739,6 +739,12 @@ async fn of_other_dimensions_one_index_is_read() {
         error.contains("deep") && error.contains("no dimension"),
         "{error}"
     );
+    request.indexes = vec![("depth".to_owned(), 0), ("depth".to_owned(), 1)];
+    let error = own.ask(&request).await.unwrap_err();
+    assert!(
+        error.contains("depth: is to be read at the index 0 and at 1"),
+        "{error}"
+    );
     request.indexes = vec![("depth".to_owned(), 0)];
     own.ask(&request).await.unwrap();
     let newest = own.newest().await;
