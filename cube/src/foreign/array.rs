@@ -17,6 +17,9 @@ use super::state;
 
 /// Most dimensions of an array.
 const MAX_RANK: usize = 32;
+/// A codec that the library has and unpacks otherwise than whoever packed by it: in the byte order of the array, and with scale and
+/// offset in single precision, so that integers are cut off below the one that was packed.
+const UNPACKED_OTHERWISE: &str = "fixedscaleoffset";
 /// Largest chunk, unpacked, bytes.
 const MAX_CHUNK_BYTES: u64 = 512 << 20;
 
@@ -83,6 +86,16 @@ impl ForeignArray {
             return Err(refused(format!(
                 "has {} dimensions, at most {MAX_RANK} are read",
                 shape.len()
+            )));
+        }
+        let codecs = match inner.metadata() {
+            ArrayMetadata::V2(own) => serde_json::to_string(&own.filters),
+            ArrayMetadata::V3(own) => serde_json::to_string(&own.codecs),
+        };
+        let codecs = codecs.map_err(|e| refused(e.to_string()))?;
+        if codecs.contains(UNPACKED_OTHERWISE) {
+            return Err(refused(format!(
+                "cannot be read by this program: codec {UNPACKED_OTHERWISE} is not supported; write it with scale_factor and add_offset instead"
             )));
         }
         let attributes = inner.attributes().clone();
