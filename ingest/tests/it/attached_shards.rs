@@ -62,6 +62,18 @@ async fn an_index_that_is_not_that_of_its_checksum_is_refused_though_it_names_wh
 }
 
 #[tokio::test]
+async fn an_index_that_leads_beyond_what_can_be_counted_is_damage() {
+    let own = Own::with(NAME);
+    change_index(&own, true, |entries| {
+        let place = [u64::MAX - 5, 10].map(u64::to_le_bytes).concat();
+        entries[..ENTRY_BYTES].copy_from_slice(&place);
+    });
+    let error = own.attach().await.unwrap_err();
+    let said = "chunk [0, 0, 0]: is damaged or of another kind";
+    assert!(error.contains(said), "{error}");
+}
+
+#[tokio::test]
 async fn a_chunk_that_a_shard_lacks_is_no_data_or_refused_as_one_that_is_not_there() {
     let take_out = |place| move |entries: &mut [u8]| entry(entries, place).fill(0xFF);
     // No data where the conventions say so: the southern rows of the last step, from Greenwich on.
