@@ -7,7 +7,7 @@ use half::f16;
 use icechunk::session::Session;
 use serde_json::{Map, Value};
 use tokio::sync::RwLock;
-use zarrs::array::{Array, ArrayMetadata, AsyncArrayShardedReadableExtCache, FillValueMetadata};
+use zarrs::array::{Array, ArrayMetadata, FillValueMetadata};
 use zarrs::plugin::ExtensionName as _;
 use zarrs::storage::AsyncReadableStorageTraits;
 
@@ -17,6 +17,9 @@ use super::state;
 
 /// Most dimensions of an array.
 const MAX_RANK: usize = 32;
+/// A codec that the library has and unpacks otherwise than whoever packed by it: in the byte order of the array, and with scale and
+/// offset in single precision, so that integers are cut off below the one that was packed.
+const UNPACKED_OTHERWISE: &str = "fixedscaleoffset";
 /// Largest chunk, unpacked, bytes.
 const MAX_CHUNK_BYTES: u64 = 512 << 20;
 
@@ -67,8 +70,6 @@ pub struct ForeignArray {
     /// Of a repository: tells where a chunk lies.
     session: Option<Arc<RwLock<Session>>>,
     pub(super) inner: Array<dyn AsyncReadableStorageTraits>,
-    /// Indexes of shards.
-    pub(super) shards: AsyncArrayShardedReadableExtCache,
 }
 
 impl ForeignArray {
@@ -85,6 +86,16 @@ impl ForeignArray {
             return Err(refused(format!(
                 "has {} dimensions, at most {MAX_RANK} are read",
                 shape.len()
+            )));
+        }
+        let codecs = match inner.metadata() {
+            ArrayMetadata::V2(own) => serde_json::to_string(&own.filters),
+            ArrayMetadata::V3(own) => serde_json::to_string(&own.codecs),
+        };
+        let codecs = codecs.map_err(|e| refused(e.to_string()))?;
+        if codecs.contains(UNPACKED_OTHERWISE) {
+            return Err(refused(format!(
+                "cannot be read by this program: codec {UNPACKED_OTHERWISE} is not supported; write it with scale_factor and add_offset instead"
             )));
         }
         let attributes = inner.attributes().clone();
@@ -107,7 +118,6 @@ impl ForeignArray {
             fill: number(kind, fill).filter(|_| is_filled),
             attributes,
             is_zarr2,
-            shards: AsyncArrayShardedReadableExtCache::new(&inner),
             place,
             failures: Arc::clone(failures),
             session: None,
@@ -284,5 +294,13 @@ impl std::fmt::Debug for ForeignArray {
 /// Index of a chunk, and the cells that it holds.
 pub(super) type ChunkCells = (Vec<u64>, Vec<Range<u64>>);
 
+/// A chunk, unpacked.
+pub(super) struct Chunk {
+    /// Its values, row-major.
+    pub(super) bytes: Vec<u8>,
+    /// Which of them no chunk of a shard holds, where they are filled in; empty if none are, or they were not looked for.
+    pub(super) lacking: Vec<bool>,
+}
+
 /// Chunks, shared.
-pub(super) type Unpacked = Option<Arc<Vec<u8>>>;
+pub(super) type Unpacked = Option<Arc<Chunk>>;

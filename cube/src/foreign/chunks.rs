@@ -1,18 +1,15 @@
 //! Values of a part of an array in, of whole chunks that are kept for the next part: each is unpacked once.
 
+use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
 
 use futures::stream::{self, StreamExt as _, TryStreamExt as _};
 use quick_cache::sync::{Cache, DefaultLifecycle};
 use quick_cache::{DefaultHashBuilder, OptionsBuilder, Weighter};
-use zarrs::array::{
-    ArrayShardedExt as _, ArrayToBytesCodecTraits as _, AsyncArrayShardedReadableExt as _,
-    CodecOptions,
-};
-use zarrs::storage::byte_range::ByteRange;
+use zarrs::array::{ArrayShardedExt as _, ArrayToBytesCodecTraits as _, CodecOptions, FillValue};
 
-use super::array::{Absent, ArrayKind, ForeignArray, Unpacked, number};
+use super::array::{Absent, ArrayKind, Chunk, ForeignArray, Unpacked, number};
 use super::error::ForeignError;
 
 /// Chunks that are kept unpacked, bytes: a year of days in one chunk along time is read a step at a time.
@@ -24,14 +21,16 @@ const CHUNKS_AT_ONCE: usize = 4;
 /// What a chunk may have packed beyond its unpacked bytes: shards have indexes, and codecs headers.
 const PACKED_EXTRA_BYTES: u64 = 1 << 20;
 
-type Key = (String, Vec<u64>);
+/// Array and index of a chunk, and whether what it lacks was looked for.
+type Key = (String, Vec<u64>, bool);
 
 #[derive(Clone)]
 struct BySize;
 
 impl Weighter<Key, Unpacked> for BySize {
     fn weight(&self, _key: &Key, chunk: &Unpacked) -> u64 {
-        chunk.as_ref().map_or(64, |bytes| bytes.len() as u64 + 64)
+        let bytes = |chunk: &Arc<Chunk>| (chunk.bytes.len() + chunk.lacking.len()) as u64;
+        chunk.as_ref().map_or(64, |chunk| bytes(chunk) + 64)
     }
 }
 
@@ -62,22 +61,23 @@ impl Chunks {
         absent: Absent,
     ) -> Result<Vec<f64>, ForeignError> {
         let chunks = array.chunks_of(part)?;
+        let is_looked_through = absent != Absent::Fill && array.inner.is_sharded();
         let count: u64 = part.iter().map(|part| part.end - part.start).product();
         let mut values = vec![f64::NAN; count as usize];
         let read = chunks.into_iter().map(|(index, cells)| async move {
-            let chunk = self.chunk(array, &index, &cells).await?;
+            let chunk = self.chunk(array, (&index, &cells), is_looked_through);
+            let chunk = chunk.await?;
             Ok::<_, ForeignError>((index, cells, chunk))
         });
         let mut read = stream::iter(read).buffered(CHUNKS_AT_ONCE);
         while let Some((index, cells, chunk)) = read.try_next().await? {
             if absent != Absent::Fill {
-                let missing = |place: &str| missing(array, place, absent);
-                check_there(array, (&index, &cells), (part, chunk.is_some()), &missing).await?;
+                check_there(array, (&index, &cells), (part, chunk.as_deref()), absent)?;
             }
             let fill = array.fill.unwrap_or(f64::NAN);
             copy(
                 array.kind,
-                (chunk.as_deref(), fill),
+                (chunk.as_ref().map(|chunk| &chunk.bytes[..]), fill),
                 &cells,
                 part,
                 &mut values,
@@ -89,11 +89,11 @@ impl Chunks {
     async fn chunk(
         &self,
         array: &ForeignArray,
-        index: &[u64],
-        cells: &[Range<u64>],
+        (index, cells): (&[u64], &[Range<u64>]),
+        is_looked_through: bool,
     ) -> Result<Unpacked, ForeignError> {
-        let key = (array.name.clone(), index.to_vec());
-        let unpacked = unpacked(array, index, cells);
+        let key = (array.name.clone(), index.to_vec(), is_looked_through);
+        let unpacked = unpacked(array, (index, cells), is_looked_through);
         self.0.get_or_insert_async(&key, unpacked).await
     }
 }
@@ -101,10 +101,11 @@ impl Chunks {
 /// A chunk as it is stored, unpacked whole with all checks of its codecs; none if it is not there.
 async fn unpacked(
     array: &ForeignArray,
-    index: &[u64],
-    cells: &[Range<u64>],
+    (index, cells): (&[u64], &[Range<u64>]),
+    is_looked_through: bool,
 ) -> Result<Unpacked, ForeignError> {
     let bytes = array.chunk_bytes(cells)?;
+    let value_bytes = array.value_bytes()? as usize;
     let place = || format!("{} chunk {index:?}", array.place);
     let packed = array.inner.async_retrieve_encoded_chunk(index).await;
     let packed = match packed.map_err(|e| array.failures.told(&place(), "reading it", &e)) {
@@ -135,30 +136,49 @@ async fn unpacked(
     );
     let decoded = tokio::task::spawn_blocking(move || {
         let options = CodecOptions::default().with_validate_checksums(true);
-        let decoded = codecs.decode(
-            Vec::from(packed).into(),
-            &shape,
-            &data_type,
-            &fill,
-            &options,
-        );
-        let decoded = decoded.and_then(|own| Ok(own.into_fixed()?.into_owned()));
-        decoded.map_err(|e| e.to_string())
+        let decode = |packed: Cow<'_, [u8]>, fill: &FillValue| {
+            let decoded = codecs.decode(packed, &shape, &data_type, fill, &options);
+            let decoded = decoded.and_then(|own| Ok(own.into_fixed()?.into_owned()));
+            decoded.map_err(|e| e.to_string())
+        };
+        let packed = Vec::from(packed);
+        // What no chunk of a shard holds comes out as what it is filled with, in shards of shards and below other codecs too.
+        let filled = is_looked_through
+            .then(|| decode(Cow::Borrowed(&packed), &other_than(&fill)))
+            .transpose()?;
+        let bytes = decode(packed.into(), &fill)?;
+        let lacking = filled.map(|filled| differing(&bytes, &filled, value_bytes));
+        let lacking = lacking.unwrap_or_default();
+        Ok::<_, String>(Chunk { bytes, lacking })
     });
-    let decoded = decoded
-        .await
-        .map_err(|e| ForeignError::refused(place(), e.to_string()))?;
+    // At an index of a shard whose places reach beyond what can be counted the library panics.
+    let decoded = decoded.await;
+    let decoded = decoded.unwrap_or_else(|e| Err(format!("it cannot be unpacked ({e})")));
     let damaged = |reason: String| {
         ForeignError::refused(place(), format!("is damaged or of another kind: {reason}"))
     };
     let decoded = decoded.map_err(damaged)?;
-    if decoded.len() as u64 != bytes {
-        return Err(damaged(format!(
-            "{} bytes where {bytes} belong",
-            decoded.len()
-        )));
+    let count = decoded.bytes.len();
+    if count as u64 != bytes {
+        return Err(damaged(format!("{count} bytes where {bytes} belong")));
     }
     Ok(Some(Arc::new(decoded)))
+}
+
+/// A value that is another one in each of its bits.
+fn other_than(fill: &FillValue) -> FillValue {
+    FillValue::new(fill.as_ne_bytes().iter().map(|byte| !byte).collect())
+}
+
+/// Which values of two chunks differ; empty if none do.
+fn differing(one: &[u8], other: &[u8], value_bytes: usize) -> Vec<bool> {
+    if one == other {
+        return vec![];
+    }
+    let both = one
+        .chunks_exact(value_bytes)
+        .zip(other.chunks_exact(value_bytes));
+    both.map(|(one, other)| one != other).collect()
 }
 
 /// The refusal of a chunk that is not there, where that cannot be told from values.
@@ -184,42 +204,51 @@ fn missing(array: &ForeignArray, place: &str, absent: Absent) -> ForeignError {
 }
 
 /// Refuses a part of which something is not there.
-async fn check_there(
+fn check_there(
     array: &ForeignArray,
     (index, cells): (&[u64], &[Range<u64>]),
-    (part, is_there): (&[Range<u64>], bool),
-    missing: &(dyn Fn(&str) -> ForeignError + Sync),
+    (part, chunk): (&[Range<u64>], Option<&Chunk>),
+    absent: Absent,
 ) -> Result<(), ForeignError> {
-    if !is_there {
-        let is_shard = array.inner.subchunk_shape().is_some();
-        let what = if is_shard { "shard" } else { "chunk" };
-        return Err(missing(&format!("{what} {index:?}")));
-    }
-    let Some(inner) = array.inner.subchunk_shape() else {
-        return Ok(());
+    let of_shard = || format!("shard {index:?}");
+    let place = match chunk {
+        None if array.inner.is_sharded() => of_shard(),
+        None => format!("chunk {index:?}"),
+        // A shard that is there may lack chunks all the same.
+        Some(chunk) => match lacked(chunk, cells, part) {
+            None => return Ok(()),
+            Some(cell) => array.inner.effective_subchunk_shape().map_or_else(
+                || format!("a chunk of {}", of_shard()),
+                |shape| {
+                    let both = cell.iter().zip(&shape);
+                    let index: Vec<u64> = both.map(|(cell, len)| cell / len.get()).collect();
+                    format!("chunk {index:?}")
+                },
+            ),
+        },
     };
-    // A shard that is there may lack chunks all the same.
-    let of = |(part, cells): (&Range<u64>, &Range<u64>), inner: u64| {
-        let (start, end) = (part.start.max(cells.start), part.end.min(cells.end));
-        start / inner..end.div_ceil(inner)
-    };
-    let both = part.iter().zip(cells);
-    let ranges: Vec<Range<u64>> = both
-        .zip(inner.iter())
-        .map(|(both, inner)| of(both, inner.get()))
-        .collect();
-    for index in indexes(&ranges) {
-        let range = array.inner.async_subchunk_byte_range(&array.shards, &index);
-        let place = format!("{} chunk {index:?}", array.place);
-        let failed = |e| array.failures.told(&place, "looking for it", &e);
-        let range = range.await.map_err(failed)?;
-        // The library gives what the index has, where one that is not there has no place but all bits set.
-        let is_there = range.is_some_and(|it| !matches!(it, ByteRange::FromStart(u64::MAX, _)));
-        if !is_there {
-            return Err(missing(&format!("chunk {index:?}")));
-        }
+    Err(missing(array, &place, absent))
+}
+
+/// The first cell of a part that no chunk of a shard holds.
+fn lacked(chunk: &Chunk, cells: &[Range<u64>], part: &[Range<u64>]) -> Option<Vec<u64>> {
+    if chunk.lacking.is_empty() {
+        return None;
     }
-    Ok(())
+    let shared = shared(part, cells);
+    let Some((last, before)) = shared.split_last() else {
+        return chunk.lacking[0].then(Vec::new);
+    };
+    let width = (last.end - last.start) as usize;
+    indexes(before).into_iter().find_map(|mut index| {
+        index.push(last.start);
+        let first = place(cells, &index);
+        let row = &chunk.lacking[first..first + width];
+        let beyond = row.iter().position(|is_lacking| *is_lacking)? as u64;
+        index.pop();
+        index.push(last.start + beyond);
+        Some(index)
+    })
 }
 
 /// All indexes in some ranges, row-major.
@@ -239,25 +268,30 @@ fn indexes(ranges: &[Range<u64>]) -> Vec<Vec<u64>> {
     all
 }
 
+/// The cells that a part and a chunk have in common.
+fn shared(part: &[Range<u64>], cells: &[Range<u64>]) -> Vec<Range<u64>> {
+    let both = part.iter().zip(cells);
+    both.map(|(part, cells)| part.start.max(cells.start)..part.end.min(cells.end))
+        .collect()
+}
+
+/// The place of a cell among those of some ranges, row-major.
+fn place(within: &[Range<u64>], index: &[u64]) -> usize {
+    let both = within.iter().zip(index);
+    both.fold(0, |place, (range, at)| {
+        place * (range.end - range.start) + (at - range.start)
+    }) as usize
+}
+
 /// Copies the cells that a chunk and a part share; of a chunk that is not there all are its fill value.
 fn copy(
     kind: ArrayKind,
-    (chunk, fill): (Option<&Vec<u8>>, f64),
+    (chunk, fill): (Option<&[u8]>, f64),
     cells: &[Range<u64>],
     part: &[Range<u64>],
     values: &mut [f64],
 ) {
-    let shared: Vec<Range<u64>> = part
-        .iter()
-        .zip(cells)
-        .map(|(part, cells)| part.start.max(cells.start)..part.end.min(cells.end))
-        .collect();
-    let place = |within: &[Range<u64>], index: &[u64]| {
-        let both = within.iter().zip(index);
-        both.fold(0, |place, (range, at)| {
-            place * (range.end - range.start) + (at - range.start)
-        }) as usize
-    };
+    let shared = shared(part, cells);
     let Some((last, before)) = shared.split_last() else {
         // An array without dimensions holds one value.
         values[0] = chunk.and_then(|chunk| number(kind, chunk)).unwrap_or(fill);

@@ -74,7 +74,13 @@ impl WebObjects {
             let failure = match answer {
                 Ok(answer) => match answer.status() {
                     StatusCode::OK | StatusCode::PARTIAL_CONTENT => return Ok(Some(answer)),
-                    StatusCode::NOT_FOUND | StatusCode::GONE => return Ok(None),
+                    StatusCode::NOT_FOUND => return Ok(None),
+                    StatusCode::GONE if method == Method::HEAD => return Ok(None),
+                    // What was taken away was written once.
+                    StatusCode::GONE => {
+                        let reason = "the server answered 410 Gone: it was there and was taken away; have it put back, or write it again";
+                        return Err(ForeignError::absent(shown(&url), reason));
+                    }
                     status => miss(status),
                 },
                 Err(failure) => failure,

@@ -430,7 +430,7 @@ fn object_store_path(key: &str) -> object_store::path::Path {
 /// What is done to a store, and what must be in the refusal.
 type Fault = (&'static str, fn(&Own), &'static [&'static str]);
 
-const FAULTS: [Fault; 13] = [
+const FAULTS: [Fault; 15] = [
     (
         "v2-plain.zarr",
         |own| {
@@ -448,6 +448,35 @@ const FAULTS: [Fault; 13] = [
             });
         },
         &["array sst", "pcodec"],
+    ),
+    (
+        "v2-plain.zarr",
+        |own| {
+            own.edit("sst/.zarray", |it| {
+                it["dtype"] = json!(">f4");
+                it["filters"] = json!([{
+                    "id": "fixedscaleoffset",
+                    "offset": 0,
+                    "scale": 1,
+                    "dtype": ">f4",
+                    "astype": "<i4",
+                }]);
+            });
+        },
+        &["array sst", "codec fixedscaleoffset is not supported"],
+    ),
+    (
+        "v3-gzip.zarr",
+        |own| {
+            let scaled = json!({
+                "name": "numcodecs.fixedscaleoffset",
+                "configuration": {"offset": 0, "scale": 1, "dtype": "<f4", "astype": "<f4"},
+            });
+            own.edit("sst/zarr.json", |it| {
+                it["codecs"].as_array_mut().unwrap().insert(0, scaled);
+            });
+        },
+        &["array sst", "codec fixedscaleoffset is not supported"],
     ),
     (
         "v2-plain.zarr",
@@ -737,6 +766,12 @@ async fn of_other_dimensions_one_index_is_read() {
     let error = own.ask(&request).await.unwrap_err();
     assert!(
         error.contains("deep") && error.contains("no dimension"),
+        "{error}"
+    );
+    request.indexes = vec![("depth".to_owned(), 0), ("depth".to_owned(), 1)];
+    let error = own.ask(&request).await.unwrap_err();
+    assert!(
+        error.contains("depth: is to be read at the index 0 and at 1"),
         "{error}"
     );
     request.indexes = vec![("depth".to_owned(), 0)];

@@ -1,6 +1,6 @@
 //! Shards that others wrote (tests/data/attached/v3-sharded.zarr): an index that was tampered with, and chunks that are not in it.
 
-use serde_json::json;
+use serde_json::{Value, json};
 
 use crate::attached::{Own, assert_same, expected, request};
 use crate::web_server::{Answer, WebServer};
@@ -59,6 +59,18 @@ async fn an_index_that_is_not_that_of_its_checksum_is_refused_though_it_names_wh
     let error = own.attach().await.unwrap_err();
     assert!(error.contains("chunk [0, 0, 0]"), "{error}");
     assert!(error.contains("checksum"), "{error}");
+}
+
+#[tokio::test]
+async fn an_index_that_leads_beyond_what_can_be_counted_is_damage() {
+    let own = Own::with(NAME);
+    change_index(&own, true, |entries| {
+        let place = [u64::MAX - 5, 10].map(u64::to_le_bytes).concat();
+        entries[..ENTRY_BYTES].copy_from_slice(&place);
+    });
+    let error = own.attach().await.unwrap_err();
+    let said = "chunk [0, 0, 0]: is damaged or of another kind";
+    assert!(error.contains(said), "{error}");
 }
 
 #[tokio::test]
@@ -133,5 +145,76 @@ async fn of_a_server_that_knows_no_parts_an_index_is_taken_from_the_whole() {
     for (step, wanted) in expected(NAME).iter().enumerate() {
         let values = own.values(&newest, step).await.unwrap();
         assert_same(&values, wanted, &format!("step {step}"));
+    }
+}
+
+/// A shard of these chunks, each packed; none for one that is not there.
+fn shard(chunks: &[Option<Vec<u8>>]) -> Vec<u8> {
+    let (mut whole, mut index) = (Vec::<u8>::new(), Vec::<u8>::new());
+    for chunk in chunks {
+        let entry = chunk.as_ref().map_or([u64::MAX; 2], |chunk| {
+            [whole.len() as u64, chunk.len() as u64]
+        });
+        whole.extend(chunk.iter().flatten());
+        index.extend(entry.map(u64::to_le_bytes).concat());
+    }
+    [whole, index].concat()
+}
+
+/// The codec of shards whose chunks have so many values and these codecs.
+fn sharded(chunk: u64, codecs: &Value) -> Value {
+    let index_codecs = json!([{"name": "bytes", "configuration": {"endian": "little"}}]);
+    let configuration = json!({
+        "chunk_shape": [chunk],
+        "codecs": codecs,
+        "index_codecs": index_codecs,
+        "index_location": "end",
+    });
+    json!({"name": "sharding_indexed", "configuration": configuration})
+}
+
+/// A store whose three times (the days 0, 1 and 2) are stored so, in a chunk of four.
+fn with_times(codecs: &Value, chunk: &[u8]) -> Own {
+    let own = Own::with(NAME);
+    own.edit("time/zarr.json", |it| {
+        it["chunk_grid"]["configuration"]["chunk_shape"] = json!([4]);
+        it["codecs"] = codecs.clone();
+    });
+    std::fs::write(own.path().join("time/c/0"), chunk).unwrap();
+    own
+}
+
+#[tokio::test]
+async fn chunks_are_looked_for_in_shards_of_shards_and_below_other_codecs() {
+    let plain = json!([{"name": "bytes", "configuration": {"endian": "little"}}]);
+    let time = |day: i32| Some(day.to_le_bytes().to_vec());
+    // A time of 0 is the fill value, and a fourth one lies beyond the array.
+    let first = |is_there: bool| time(0).filter(|_| is_there);
+    let in_shards = |is_there| {
+        let halves = [vec![first(is_there), time(1)], vec![time(2), None]];
+        shard(&halves.map(|half| Some(shard(&half))))
+    };
+    let checked = |is_there| {
+        let whole = shard(&[first(is_there), time(1), time(2), None]);
+        let sum = crc32c(&whole).to_le_bytes();
+        [whole, sum.to_vec()].concat()
+    };
+    let nested = json!([sharded(2, &json!([sharded(1, &plain)]))]);
+    let below = json!([sharded(1, &plain), {"name": "crc32c"}]);
+    for (codecs, is_there, is_lost) in [
+        (nested, in_shards(true), in_shards(false)),
+        (below, checked(true), checked(false)),
+    ] {
+        let own = with_times(&codecs, &is_there);
+        own.attach().await.unwrap();
+        let newest = own.newest().await;
+        for (step, wanted) in expected(NAME).iter().enumerate() {
+            let values = own.values(&newest, step).await.unwrap();
+            assert_same(&values, wanted, &format!("step {step}"));
+        }
+        let own = with_times(&codecs, &is_lost);
+        let error = own.attach().await.unwrap_err();
+        let said = "array time chunk [0]: is not there";
+        assert!(error.contains(said), "{codecs}: {error}");
     }
 }
