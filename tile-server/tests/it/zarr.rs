@@ -77,11 +77,16 @@ async fn what_there_is_not_is_not_found() {
         ("flux/c/c/c/0", "nothing at this address"),
         ("flux/timec/0", "nothing at this address"),
         ("flux//zarr.json", "nothing at this address"),
+        ("flux/time//zarr.json", "nothing at this address"),
+        ("flux/time/%2E/zarr.json", "nothing at this address"),
+        ("flux/time/%2E/c/0", "nothing at this address"),
         ("flux/time/c/+0", "nothing at this address"),
         ("flux/time/c/00", "nothing at this address"),
         ("nothing/zarr.json", "no product"),
         ("flux@99/zarr.json", "no version"),
         ("flux@x/zarr.json", "no version"),
+        ("flux@01/zarr.json", "no version"),
+        ("flux@+1/zarr.json", "no version"),
         ("flux@1-00000000/zarr.json", "no version"),
     ] {
         let answer = app.get(&format!("/zarr/{key}")).await;

@@ -14,6 +14,8 @@ const TOLERANCE_CELLS: f64 = 0.02;
 /// Edges and steps closer than this (in cells) to a round fraction of a degree are taken to be that. Labels that are farther from
 /// their places are told of.
 const SNAP_CELLS: f64 = 2e-3;
+/// What sums in double precision are off by, cells, with room for narrow ones far from 0.
+const SUM_CELLS: f64 = 1e-9;
 /// A longitude axis that misses the whole turn by less than this (in cells) was meant to make one: labels of single
 /// precision that were summed up drift so far.
 const TURN_CELLS: f64 = 0.05;
@@ -91,8 +93,8 @@ impl Mapping {
         } else {
             lon.last()
         };
-        let mut north = snapped_edge(northernmost + north_shift * dlat, dlat);
-        let west = snapped_edge(westernmost - west_shift * dlon, dlon);
+        let mut north = snapped_edge(northernmost + north_shift * dlat, dlat, lat.count);
+        let west = snapped_edge(westernmost - west_shift * dlon, dlon, lon.count);
         let mut file_rows: Vec<u32> = if lat.step > 0.0 {
             (0..lat.count).rev().collect()
         } else {
@@ -186,7 +188,7 @@ impl Mapping {
             file_cols.pop();
         }
         let cols = file_cols.len() as u32;
-        let mut west_deg = snapped_edge(wrap_lon_deg(west_deg), dlon);
+        let mut west_deg = snapped_edge(wrap_lon_deg(west_deg), dlon, cols);
         if west_deg >= 180.0 {
             west_deg -= 360.0;
         }
@@ -194,7 +196,8 @@ impl Mapping {
             // The first column whose western edge is at or east of -180.
             let skipped = ((180.0 - west_deg) / dlon - SNAP_CELLS).ceil().max(0.0) as u32 % cols;
             file_cols.rotate_left(skipped as usize);
-            west_deg = snapped_edge(wrap_lon_deg(west_deg + f64::from(skipped) * dlon), dlon);
+            let turned_deg = wrap_lon_deg(west_deg + f64::from(skipped) * dlon);
+            west_deg = snapped_edge(turned_deg, dlon, cols);
         }
         let grid = Grid {
             rows: file_rows.len() as u32,
@@ -352,10 +355,12 @@ fn closed_step(axis: Regular) -> f64 {
     snapped_step(axis)
 }
 
-/// An edge as the multiple of half a cell it was meant to be, if it is close to one.
-fn snapped_edge(edge: f64, step: f64) -> f64 {
+/// An edge as the multiple of half a cell it was meant to be, if it is close to one. Of one cell alone the width is no better known than its
+/// edges are, and what it is off by would count as often as it goes into the way from 0: there only sums are rounded.
+fn snapped_edge(edge: f64, step: f64, count: u32) -> f64 {
+    let reach = if count == 1 { SUM_CELLS } else { SNAP_CELLS };
     let halves = (edge / step * 2.0).round();
-    if (edge / step * 2.0 - halves).abs() < 2.0 * SNAP_CELLS {
+    if (edge / step * 2.0 - halves).abs() < 2.0 * reach {
         halves * step / 2.0
     } else {
         edge
@@ -670,6 +675,16 @@ mod tests {
         };
         assert_eq!((m.grid, &m.file_cols[..]), (grid, &[0][..]));
         assert!(m.grid.is_periodic());
+        // Edges that were written with nine decimals.
+        let width_deg = 0.333_333_334;
+        let place = [
+            only(&[-15.6], Some(width_deg)),
+            only(&[-30.0], Some(width_deg)),
+        ];
+        let grid = mapped(place[0], place[1]).unwrap().grid;
+        let off =
+            [grid.north_deg + 15.6, grid.west_deg + 30.0].map(|edge| edge.abs() - width_deg / 2.0);
+        assert!(farthest(off.into_iter()) < 1e-12, "{grid:?}");
         let refused = mapped(only(&[2.0], None), only(&lon, None)).unwrap_err();
         assert!(
             refused.detail.contains("one label and no bounds"),
