@@ -161,6 +161,31 @@ async fn parts_are_those_of_the_whole_and_copies_are_known_again() {
 }
 
 #[tokio::test]
+async fn pages_of_other_origins_may_ask_for_parts_and_are_told_which_they_have() {
+    let app = TestApp::new().await;
+    let path = "/zarr/flux@1/carbon_flux/c/0/0/0";
+    let request = Request::builder()
+        .method("OPTIONS")
+        .uri(path)
+        .header("origin", "http://map.example")
+        .header("access-control-request-method", "GET")
+        .header("access-control-request-headers", "if-range,range");
+    let answer = app.send(request.body(Body::empty()).unwrap()).await;
+    let allowed = answer.header("access-control-allow-headers");
+    let allowed: Vec<&str> = allowed.split(',').map(str::trim).collect();
+    for name in ["range", "if-range", "if-none-match"] {
+        assert!(allowed.contains(&name), "{name}: {allowed:?}");
+    }
+    let headers = [("origin", "http://map.example"), ("range", "bytes=-4")];
+    let answer = app.get_with(path, &headers).await;
+    assert_eq!(answer.status, StatusCode::PARTIAL_CONTENT);
+    let exposed = answer.header("access-control-expose-headers");
+    for name in ["content-range", "etag"] {
+        assert!(exposed.contains(name), "{name}: {exposed}");
+    }
+}
+
+#[tokio::test]
 async fn what_nobody_takes_counts_as_held_until_it_is_gone() {
     let app = TestApp::new().await;
     let path = "/zarr/flux@1/carbon_flux/c/0/0/0";
