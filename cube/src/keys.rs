@@ -144,8 +144,7 @@ impl Keys {
             }));
         }
         // The library finds a chunk at `timec/0` too, and takes `c/0` for a chunk of the group, which is an error.
-        let array = key.strip_suffix(ARRAY_METADATA);
-        let is_metadata = array.is_some_and(|array| !array.is_empty());
+        let is_metadata = key.ends_with(ARRAY_METADATA) && is_one_spelling(key);
         if !is_metadata && chunk_of(key).is_none() {
             return Ok(None);
         }
@@ -175,6 +174,9 @@ fn is_absent(error: &StoreErrorKind) -> bool {
 
 /// The array and the place of a chunk, if that is what a key names.
 fn chunk_of(key: &str) -> Option<(Path, ChunkIndices)> {
+    if !is_one_spelling(key) {
+        return None;
+    }
     let (array, index) = match key.strip_suffix("/c") {
         // The one chunk of a number.
         Some(array) => (array, ""),
@@ -189,6 +191,11 @@ fn chunk_of(key: &str) -> Option<(Path, ChunkIndices)> {
     }
     let path = Path::new(&format!("/{array}")).ok()?;
     Some((path, ChunkIndices(index?)))
+}
+
+/// Is it a key as it is written? The library passes over empty parts and dots between slashes, so that many spellings would be one key.
+fn is_one_spelling(key: &str) -> bool {
+    key.split('/').all(|part| !matches!(part, "" | "." | ".."))
 }
 
 /// A place along an axis, as it is written: another spelling of it is another key, which is not there.
@@ -223,8 +230,17 @@ mod tests {
             "/c/0",
             "/c",
             ".zgroup",
+            "flux/./c/0",
+            "flux//c/0",
+            "./flux/c/0",
+            "/flux/c/0",
+            "levels/../flux/c/0",
         ] {
             assert_eq!(of(none), None, "{none}");
+        }
+        assert!(is_one_spelling("levels/1/flux/zarr.json"));
+        for other in ["flux/./zarr.json", "/flux/zarr.json", "flux//zarr.json"] {
+            assert!(!is_one_spelling(other), "{other}");
         }
     }
 }

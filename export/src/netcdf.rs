@@ -21,6 +21,9 @@ const DEFLATE_LEVEL: u8 = 4;
 /// Unit of time. Whole seconds are exact in 64 bits, and every program knows them.
 const TIME_UNITS: &str = "seconds since 1970-01-01 00:00:00";
 
+/// The ellipsoid of latitudes by the name that other programs know it by, EPSG:4326 (OGC 18-010r7).
+const WGS84: &str = r#"GEOGCRS["WGS 84",DATUM["World Geodetic System 1984",ELLIPSOID["WGS 84",6378137,298.257223563,LENGTHUNIT["metre",1]]],PRIMEM["Greenwich",0,ANGLEUNIT["degree",0.0174532925199433]],CS[ellipsoidal,2],AXIS["geodetic latitude (Lat)",north,ORDER[1],ANGLEUNIT["degree",0.0174532925199433]],AXIS["geodetic longitude (Lon)",east,ORDER[2],ANGLEUNIT["degree",0.0174532925199433]],ID["EPSG",4326]]"#;
+
 /// The file as it is being written.
 pub struct NetCdf {
     path: PathBuf,
@@ -146,6 +149,11 @@ fn begin(
         .create("crs")?;
     crs.write_scalar(&0)?;
     attributes(&crs, cf::of_crs())?;
+    let corner = corner(&description.grid);
+    texts(
+        &crs,
+        &[("crs_wkt", WGS84), ("GeoTransform", corner.as_str())],
+    )?;
     let values = write_values(
         &file,
         description,
@@ -207,6 +215,19 @@ fn write_time(file: &File, is_sum: bool, periods: &[Period]) -> hdf5::Result<Dat
         attach(file, &start, &[&time])?;
     }
     Ok(time)
+}
+
+/// North-western corner and sides of cells as GDAL writes and reads them: from centres alone it makes no places of one row or one column, and
+/// turns a column upside down.
+fn corner(grid: &Grid) -> String {
+    let Grid {
+        north_deg,
+        west_deg,
+        dlat_deg,
+        dlon_deg,
+        ..
+    } = grid;
+    format!("{west_deg} {dlon_deg} 0 {north_deg} 0 -{dlat_deg}")
 }
 
 /// A sum is one since the first step.

@@ -13,6 +13,7 @@ use parquet::arrow::ArrowWriter;
 use parquet::basic::{Compression, ZstdLevel};
 use parquet::file::metadata::KeyValue;
 use parquet::file::properties::WriterProperties;
+use serde_json::Value;
 use tempfile::NamedTempFile;
 
 use crate::cells::Cells;
@@ -117,22 +118,29 @@ fn schema(description: &Description) -> Arc<Schema> {
         Field::new(name, kind, false).with_metadata(unit.into())
     };
     let variable = cf::variable(description.quantity);
+    // What other formats say of the values; there is no grid mapping here to name.
+    let said = cf::of_values(description).into_iter();
+    let said = said.filter(|(name, _)| name != "grid_mapping");
+    let values = Field::new(&variable, DataType::Float32, false)
+        .with_metadata(said.map(|(name, value)| (name, text(&value))).collect());
     Arc::new(Schema::new(vec![
         Field::new("time_start", instant(), false),
         Field::new("time_end", instant(), false),
         with_unit("lat", DataType::Float64, "degrees_north"),
         with_unit("lon", DataType::Float64, "degrees_east"),
-        with_unit(&variable, DataType::Float32, description.quantity.unit()),
+        values,
     ]))
 }
 
+/// An attribute as a text: what is none is JSON.
+fn text(value: &Value) -> String {
+    let text = value.as_str().map(str::to_owned);
+    text.unwrap_or_else(|| value.to_string())
+}
+
 fn properties(description: &Description) -> parquet::errors::Result<WriterProperties> {
-    let said = description.attributes().into_iter().map(|(name, value)| {
-        let text = value
-            .as_str()
-            .map_or_else(|| value.to_string(), str::to_owned);
-        KeyValue::new(name, text)
-    });
+    let said = description.attributes().into_iter();
+    let said = said.map(|(name, value)| KeyValue::new(name, text(&value)));
     Ok(WriterProperties::builder()
         .set_compression(Compression::ZSTD(ZstdLevel::try_new(3)?))
         .set_max_row_group_row_count(Some(GROUP_ROWS))

@@ -5,6 +5,7 @@ mod text_type;
 
 use std::path::Path;
 
+use hdf5::file::LinkCreationOrder;
 use hdf5::types::{FixedAscii, VarLenArray, VarLenUnicode};
 use hdf5::{Dataset, File, H5Type, Location, ObjectReference as _, ObjectReference1};
 
@@ -16,8 +17,13 @@ use text_type::null_terminated;
 /// It cannot be made there.
 pub fn create(path: &Path) -> hdf5::Result<File> {
     File::with_options()
-        // No object may carry the time of its making: the same values give the same bytes.
-        .with_fcpl(|create| create.obj_track_times(false))
+        .with_fcpl(|create| {
+            create
+                // No object may carry the time of its making: the same values give the same bytes.
+                .obj_track_times(false)
+                // Without it the netCDF library opens a file to read and never to write (`Can't write file`).
+                .link_creation_order(LinkCreationOrder::Indexed)
+        })
         // Nobody else knows of it yet. A program that is started meanwhile inherits the open file (HDF5 asks for no
         // close-on-exec) and would hold its lock on, so that no other could open what is long written.
         .with_fapl(|access| access.file_locking(false))

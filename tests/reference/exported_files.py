@@ -8,7 +8,9 @@ values were compared.
 """
 
 import json
+import shutil
 import sys
+import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -55,7 +57,34 @@ def netcdf(path, expected):
             if expected["is_sum"]:
                 assert round(float(data["step_start"][at]) * 1000) == step["start_ms"]
             count += same(values[at], step["bits"], at)
-        return count
+    changed(path, expected["variable"])
+    placed(path, expected)
+    return count
+
+
+def changed(path, variable):
+    """Other words in a copy of it, as who gets a file may want them: the library writes only in files that keep the order of their making."""
+    import netCDF4
+
+    with tempfile.TemporaryDirectory() as folder:
+        copy = shutil.copy(path, folder)
+        with netCDF4.Dataset(copy, "a") as data:
+            data.title = "Another"
+            data[variable].comment = "changed"
+        with netCDF4.Dataset(copy) as data:
+            assert (data.title, data[variable].comment) == ("Another", "changed")
+            assert list(data.dimensions) == ["time", "lat", "lon", "bnds"], data.dimensions
+
+
+def placed(path, expected):
+    """GDAL puts it where it is, by name of its reference system."""
+    import rasterio
+
+    with rasterio.open(f"netcdf:{path}:{expected['variable']}") as data:
+        assert data.crs.to_epsg() == 4326, data.crs
+        found = [data.bounds.left, data.bounds.bottom, data.bounds.right, data.bounds.top]
+        assert np.abs(np.array(found) - expected["edges"]).max() < 1e-9, found
+        same(data.read(1), expected["steps"][0]["bits"], "GDAL")
 
 
 def geotiff(path, expected):
@@ -90,7 +119,9 @@ def parquet(path, expected):
     variable = expected["variable"]
     assert table.column_names == ["time_start", "time_end", "lat", "lon", variable], table.column_names
     assert str(table.schema.field("time_start").type) == "timestamp[ms, tz=UTC]"
-    assert table.schema.field(variable).metadata[b"units"].decode() == expected["units"]
+    said = {name.decode(): text.decode() for name, text in table.schema.field(variable).metadata.items()}
+    assert (said["units"], said["long_name"]) == (expected["units"], expected["long_name"]), said
+    assert ("time: sum" in said.get("cell_methods", "")) == expected["is_sum"] and "grid_mapping" not in said, said
     column = {name: table[name].to_numpy() for name in table.column_names}
     lat, lon = np.array(expected["lat"]), np.array(expected["lon"])
     count = 0

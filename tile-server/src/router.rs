@@ -35,7 +35,10 @@ fn compressible() -> impl Predicate {
 /// Map clients on other pages may read everything here: nothing is private and nobody logs in.
 fn other_origins(takes: Takes) -> CorsLayer {
     let layer = match takes {
-        Takes::Nothing => CorsLayer::new().allow_methods([Method::GET, Method::HEAD]),
+        // Browsers ask first for ranges that end at the end of a chunk, and for conditions.
+        Takes::Nothing => CorsLayer::new()
+            .allow_methods([Method::GET, Method::HEAD])
+            .allow_headers([header::RANGE, header::IF_RANGE, header::IF_NONE_MATCH]),
         Takes::Geometries => CorsLayer::new()
             .allow_methods([Method::GET, Method::HEAD, Method::POST])
             .allow_headers([header::CONTENT_TYPE]),
@@ -51,6 +54,8 @@ fn other_origins(takes: Takes) -> CorsLayer {
             HEIGHTS_WITHIN,
             TILT_WITH_GROUND,
             header::CONTENT_LOCATION,
+            header::CONTENT_RANGE,
+            header::ETAG,
         ])
 }
 

@@ -194,6 +194,7 @@ fn geotiff_is_read_by_gdal() {
 fn parquet_is_read_by_arrow() {
     let open = Quantity::open("river_flux", "mol m-2 s-1", "River flux").unwrap();
     read_back(Format::Parquet, "parquet", open);
+    read_back(Format::Parquet, "parquet", Quantity::AccumulatedCarbon);
 }
 
 #[test]

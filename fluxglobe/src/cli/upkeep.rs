@@ -5,8 +5,8 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use compute::recompute::What;
-use contract::manifest::AskedVersion;
 use contract::index::DimensionIndex;
+use contract::manifest::AskedVersion;
 use contract::product::ProductId;
 use contract::time::TimeMs;
 use storage::pins;

@@ -61,15 +61,18 @@ pub(crate) fn check(
     Err(Rejection::new(RejectReason::Values, &variable.name, detail))
 }
 
-/// What is told of an export whose values are not those of its quantity, where that is built in.
+/// What is told of an export whose values are not those of its quantity. Climatologies of quantities that are not built in, which have no
+/// budget anyhow, are told by [`climatology`] alone.
 pub(crate) fn note(file: &description::Description, variable: &Variable) -> Option<String> {
     let own = exported(file, variable).filter(|own| !is_of_values(own))?;
-    if matches!(own.quantity, Quantity::Open(_)) {
-        return None;
-    }
     let statistic = own.statistic?;
+    let without = match own.quantity {
+        Quantity::Open(_) if matches!(statistic, MapStatistic::Climatology) => return None,
+        Quantity::Open(_) => "",
+        _ => "; it has no budget",
+    };
     Some(format!(
-        "{}: holds the statistic {statistic} over time of {} and not that itself; it has no budget",
+        "{}: holds the statistic {statistic} over time of {} and not that itself{without}",
         variable.name,
         own.quantity.title()
     ))
@@ -222,6 +225,34 @@ mod tests {
         }
         let (file, variable) = file(None, "up");
         assert_eq!(climatology(&file, &variable), None);
+    }
+
+    #[test]
+    fn extremes_of_open_quantities_are_told_and_their_climatologies_once() {
+        let open = Quantity::open("mixed_layer", "m", "Mixed layer").unwrap();
+        for (statistic, is_told) in [
+            ("max", true),
+            ("p90", true),
+            ("mean", false),
+            ("climatology", false),
+        ] {
+            let own = Description {
+                quantity: open,
+                ..of_flux(Some(statistic.parse().unwrap()))
+            };
+            let text = AttributeValue::Text(own.attributes()[Description::ATTRIBUTE].to_string());
+            let (mut file, mut variable) = file(None, "");
+            file.attributes = [(Description::ATTRIBUTE.to_owned(), text)]
+                .into_iter()
+                .collect();
+            variable.name = "mixed_layer".to_owned();
+            let told = note(&file, &variable);
+            assert_eq!(told.is_some(), is_told, "{statistic}: {told:?}");
+            let told = told.unwrap_or_default();
+            assert!(!told.contains("budget"), "{told}");
+            let also = climatology(&file, &variable);
+            assert_eq!(also.is_some(), statistic == "climatology", "{also:?}");
+        }
     }
 
     #[test]

@@ -152,8 +152,12 @@ async fn opened(state: &AppState, product: &str) -> Result<(Arc<Keys>, bool), Se
     };
     let (name, number) = match (&id, product.split_once('@')) {
         (Some(id), _) => (id.product.clone(), id.number),
-        (None, Some((name, number))) => {
-            let number = number.parse().map_err(|_no_number| unknown())?;
+        (None, Some((name, text))) => {
+            let number: u64 = text.parse().map_err(|_no_number| unknown())?;
+            // Another spelling would be another address of what has one.
+            if number.to_string() != text {
+                return Err(unknown());
+            }
             (name.parse()?, number)
         }
         (None, None) => return Err(unknown()),
@@ -182,6 +186,14 @@ fn part(asked: &HeaderMap, length: u64) -> Result<Option<Range<u64>>, ServerErro
     else {
         return Ok(None);
     };
+    // Digits and nothing else (RFC 9110, 14.1.1): numbers of the language may have a sign.
+    if [from, to]
+        .concat()
+        .bytes()
+        .any(|byte| !byte.is_ascii_digit())
+    {
+        return Ok(None);
+    }
     let (start, end) = match (from.parse::<u64>(), to.parse::<u64>()) {
         (Ok(from), Ok(to)) if from <= to => (from, to.saturating_add(1).min(length)),
         (Ok(from), Err(_)) if to.is_empty() => (from, length),
@@ -234,6 +246,9 @@ mod tests {
             "lines=1-2",
             "bytes=9-1",
             "bytes=-",
+            "bytes=+0-9",
+            "bytes=0-+9",
+            "bytes=-+9",
         ] {
             assert_eq!(of(all), Ok(None), "{all}");
         }

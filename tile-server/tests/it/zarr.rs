@@ -78,11 +78,16 @@ async fn what_there_is_not_is_not_found() {
         ("flux/c/c/c/0", "nothing at this address"),
         ("flux/timec/0", "nothing at this address"),
         ("flux//zarr.json", "nothing at this address"),
+        ("flux/time//zarr.json", "nothing at this address"),
+        ("flux/time/%2E/zarr.json", "nothing at this address"),
+        ("flux/time/%2E/c/0", "nothing at this address"),
         ("flux/time/c/+0", "nothing at this address"),
         ("flux/time/c/00", "nothing at this address"),
         ("nothing/zarr.json", "no product"),
         ("flux@99/zarr.json", "no version"),
         ("flux@x/zarr.json", "no version"),
+        ("flux@01/zarr.json", "no version"),
+        ("flux@+1/zarr.json", "no version"),
         ("flux@1-00000000/zarr.json", "no version"),
     ] {
         let answer = app.get(&format!("/zarr/{key}")).await;
@@ -192,6 +197,31 @@ async fn version_2_has_the_same_chunks_without_their_checksums_and_whole_metadat
     ] {
         let answer = app.get(&format!("/zarr2/{none}")).await;
         assert_eq!(answer.status, StatusCode::NOT_FOUND, "{none}");
+    }
+}
+
+#[tokio::test]
+async fn pages_of_other_origins_may_ask_for_parts_and_are_told_which_they_have() {
+    let app = TestApp::new().await;
+    let path = "/zarr/flux@1/carbon_flux/c/0/0/0";
+    let request = Request::builder()
+        .method("OPTIONS")
+        .uri(path)
+        .header("origin", "http://map.example")
+        .header("access-control-request-method", "GET")
+        .header("access-control-request-headers", "if-range,range");
+    let answer = app.send(request.body(Body::empty()).unwrap()).await;
+    let allowed = answer.header("access-control-allow-headers");
+    let allowed: Vec<&str> = allowed.split(',').map(str::trim).collect();
+    for name in ["range", "if-range", "if-none-match"] {
+        assert!(allowed.contains(&name), "{name}: {allowed:?}");
+    }
+    let headers = [("origin", "http://map.example"), ("range", "bytes=-4")];
+    let answer = app.get_with(path, &headers).await;
+    assert_eq!(answer.status, StatusCode::PARTIAL_CONTENT);
+    let exposed = answer.header("access-control-expose-headers");
+    for name in ["content-range", "etag"] {
+        assert!(exposed.contains(name), "{name}: {exposed}");
     }
 }
 

@@ -752,6 +752,16 @@ mod tests {
         };
         assert_eq!((m.grid, &m.file_cols[..]), (grid, &[0][..]));
         assert!(m.grid.is_periodic());
+        // Edges that were written with nine decimals.
+        let width_deg = 0.333_333_334;
+        let place = [
+            only(&[-15.6], Some(width_deg)),
+            only(&[-30.0], Some(width_deg)),
+        ];
+        let grid = mapped(place[0], place[1]).unwrap().grid;
+        let off =
+            [grid.north_deg + 15.6, grid.west_deg + 30.0].map(|edge| edge.abs() - width_deg / 2.0);
+        assert!(farthest(off.into_iter()) < 1e-12, "{grid:?}");
         let refused = mapped(only(&[2.0], None), only(&lon, None)).unwrap_err();
         assert!(
             refused.detail.contains("one label and no bounds"),
