@@ -78,6 +78,7 @@ async fn what_references_that_cannot_be_read_refer_to_stays() {
     let kept = Kept {
         manifests: vec![version],
         versions: 1,
+        oldest_ms: i64::MAX,
     };
     let in_use = Versions.in_use(&own.store, &kept).await.unwrap();
     assert!(in_use.contains(&attachment));
