@@ -74,10 +74,12 @@ pub fn run(
     is_dry_run: bool,
 ) -> BoxFuture<'_, Result<Vec<Cleaned>, CubeError>> {
     Box::pin(async move {
+        let older_than = older_than(now, keep.age.max(LEAST_AGE))?;
+        let oldest_ms = older_than.timestamp_millis();
         let cleaning = Cleaning {
             store,
-            kept: Kept::read(store, keep.versions.max(1)).await?,
-            older_than: older_than(now, keep.age.max(LEAST_AGE))?,
+            kept: Kept::read(store, keep.versions.max(1), oldest_ms).await?,
+            older_than,
             is_dry_run,
         };
         let mut all = vec![];

@@ -139,6 +139,9 @@ impl Check<'_> {
         }
         for (shown, at) in states {
             let cube = repository.at(&at).await?;
+            if matches!(at, At::Version(_)) {
+                self.of_another(&cube, &shown, checked).await?;
+            }
             if self
                 .has_manifests(&repository, &cube, &shown, checked)
                 .await?
@@ -171,6 +174,35 @@ impl Check<'_> {
                 key: self.entry.clone(),
                 fault: Fault::Behind,
                 reason: format!("its newest version is {own}, that of the product {latest}"),
+            });
+        }
+        Ok(())
+    }
+
+    /// Notes where a state has the name of another version than it is of: somebody took that one's manifest away, and what was published
+    /// next has its number.
+    async fn of_another(
+        &self,
+        cube: &Cube,
+        shown: &str,
+        checked: &mut Checked,
+    ) -> Result<(), CubeError> {
+        let Some(own) = &cube.description().version else {
+            return Ok(());
+        };
+        let published = match manifests::numbered(self.store, &own.product, own.number).await {
+            Ok(published) => published.map(|manifest| manifest.id()),
+            // It is told of by its own name.
+            Err(StorageError::Damaged { .. }) => None,
+            Err(error) => return Err(error.into()),
+        };
+        if let Some(published) = published
+            && published != *own
+        {
+            checked.findings.push(Finding {
+                key: self.entry.clone(),
+                fault: Fault::Damaged,
+                reason: format!("{shown} is {own}, that of the product {published}"),
             });
         }
         Ok(())

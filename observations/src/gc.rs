@@ -1,4 +1,4 @@
-//! Files of observations, for clean-up: in use are those that the newest indexes of their dataset name, and these.
+//! Files of observations, for clean-up: in use are those that the newest and the young indexes of their dataset name, and these.
 
 use std::collections::BTreeSet;
 
@@ -25,6 +25,9 @@ impl Owner for Datasets {
         store: &Store,
         kept: &Kept,
     ) -> Result<BTreeSet<ObjectKey>, StorageError> {
-        index::named_by_newest(store, kept.versions).await
+        if kept.versions == 0 {
+            return Ok(BTreeSet::new());
+        }
+        index::named_by_newest(store, kept.versions, kept.oldest_ms).await
     }
 }

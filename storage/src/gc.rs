@@ -56,6 +56,9 @@ pub struct GcPlan {
     pub kept_count: usize,
     /// Versions that are there and would not be kept if they were not pinned, but for their age.
     pub only_pinned_count: usize,
+    /// Versions that were published at this instant or later stay, ms.
+    #[serde(skip)]
+    oldest_ms: i64,
 }
 
 impl GcPlan {
@@ -115,11 +118,19 @@ impl<'a> InUse<'a> {
         store: &Store,
         owners: &'a [&'a dyn Owner],
         keep: Keep,
+        oldest_ms: i64,
     ) -> Result<Self, StorageError> {
-        let kept = Kept::read(store, keep.versions.max(1)).await?;
+        let kept = Kept::read(store, keep.versions.max(1), oldest_ms).await?;
         let mut keys = BTreeSet::new();
         for owner in owners {
             keys.append(&mut owner.in_use(store, &kept).await?);
+        }
+        // Who stays for its age is to be read as the newest are, and may be of things that are older. They may be many: one is held at a time.
+        for (product, number) in kept.young(store).await? {
+            let one = Kept::one(store, &product, number).await?;
+            for owner in owners {
+                keys.append(&mut owner.in_use(store, &one).await?);
+            }
         }
         Ok(Self {
             owners,
@@ -147,9 +158,11 @@ pub async fn plan(
     keep: Keep,
     now: TimeMs,
 ) -> Result<GcPlan, StorageError> {
-    let in_use = InUse::read(store, owners, keep).await?;
+    let oldest_ms = now.ms() - keep.age.max(LEAST_AGE).as_millis() as i64;
+    let in_use = InUse::read(store, owners, keep, oldest_ms).await?;
     let mut plan = GcPlan {
         only_pinned_count: in_use.only_pinned_count,
+        oldest_ms,
         ..GcPlan::default()
     };
     let mut kinds: Vec<(Kind, Duration)> = owners
@@ -184,12 +197,12 @@ pub async fn run(
     keep: Keep,
     progress: &(dyn Fn(usize) + Send + Sync),
 ) -> Result<usize, StorageError> {
-    let mut in_use = InUse::read(store, owners, keep).await?;
+    let mut in_use = InUse::read(store, owners, keep, plan.oldest_ms).await?;
     let mut removed = BTreeSet::new();
     for (index, garbage) in plan.garbage.iter().enumerate() {
         // Where somebody has pinned a version since, what it names, which comes later, stays with it.
         if !in_use.holds(&garbage.key) && pins::holds(store, &garbage.key).await? {
-            in_use = InUse::read(store, owners, keep).await?;
+            in_use = InUse::read(store, owners, keep, plan.oldest_ms).await?;
         }
         if !in_use.holds(&garbage.key) {
             store.remove(&garbage.key).await?;
@@ -211,7 +224,7 @@ pub async fn run(
             .find(|owner| kind.is_some_and(|kind| owner.kinds().contains(&kind)));
         owner.is_some_and(|owner| !owner.is_made_again())
     };
-    let now_in_use = InUse::read(store, owners, keep).await?;
+    let now_in_use = InUse::read(store, owners, keep, plan.oldest_ms).await?;
     let lost: Vec<String> = now_in_use
         .keys
         .iter()

@@ -8,7 +8,7 @@ use contract::product::ProductId;
 use cube::{At, CubeError, Keys, Repository, ZarrVersion};
 use prometheus::IntGauge;
 use quick_cache::sync::Cache;
-use storage::Store;
+use storage::{StorageError, Store, manifests};
 
 use crate::backend::Turn;
 use crate::client::Client;
@@ -70,8 +70,9 @@ impl Cubes {
         // To open a cube is a large future, and seldom: routes do not hold it in theirs.
         let opening = Box::pin(async {
             let repository = Repository::open(&self.store, &cube::folder(product)).await?;
-            let keys = repository.keys(&At::Version(number.to_string())).await;
-            keys.map(Arc::new)
+            let keys = repository.keys(&At::Version(number.to_string())).await?;
+            self.check(product, number, &keys).await?;
+            Ok::<_, CubeError>(Arc::new(keys))
         });
         match self.open.get_or_insert_async(&name, opening).await {
             Ok(keys) => Ok(keys),
@@ -82,6 +83,26 @@ impl Cubes {
         }
     }
 
+    /// # Errors
+    /// `NoVersion` where another version has the number now: somebody took the manifest of the cube's away.
+    async fn check(&self, product: &ProductId, number: u64, keys: &Keys) -> Result<(), CubeError> {
+        let published = match manifests::numbered(&self.store, product, number).await {
+            Ok(published) => published.map(|manifest| manifest.id()),
+            // The cube has its own checks.
+            Err(StorageError::Damaged { .. }) => None,
+            Err(error) => return Err(error.into()),
+        };
+        let own = keys.description().version.as_ref();
+        match own.zip(published) {
+            Some((own, published)) if *own != published => Err(CubeError::NoVersion {
+                place: cube::folder(product),
+                version: published.to_string(),
+                there: own.to_string(),
+            }),
+            _ => Ok(()),
+        }
+    }
+
     /// Why a version has no cube.
     async fn without_cube(
         &self,
@@ -89,7 +110,7 @@ impl Cubes {
         number: u64,
         name: String,
     ) -> Result<ServerError, ServerError> {
-        let version = storage::manifests::numbered(&self.store, product, number).await?;
+        let version = manifests::numbered(&self.store, product, number).await?;
         let attached = match &version {
             Some(version) => self.store.attached_to(version).await?,
             None => None,

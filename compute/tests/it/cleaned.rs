@@ -5,12 +5,14 @@ use std::path::Path;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use compute::gc::Computed;
+use contract::grid::Grid;
 use contract::key::ObjectKey;
+use contract::quantity::Quantity;
 use contract::time::TimeMs;
-use storage::Store;
 use storage::gc::{self, Keep, Owner, Versions};
+use storage::{Store, fields};
 
-use crate::fixture::folder_store;
+use crate::fixture::{folder_store, land, months, product};
 
 const DAY_MS: i64 = 86_400_000;
 const DAY: Duration = Duration::from_hours(24);
@@ -77,4 +79,49 @@ async fn files_of_killed_writers_go_and_those_of_living_ones_stay() {
         .await
         .unwrap();
     assert!(fresh.exists() && !living.exists());
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_version_that_stays_for_its_age_keeps_all_that_it_is_made_of() {
+    const GRID: Grid = Grid {
+        rows: 2,
+        cols: 3,
+        north_deg: 10.0,
+        west_deg: 0.0,
+        dlat_deg: 1.0,
+        dlon_deg: 1.0,
+    };
+    let (folder, store) = folder_store();
+    let (flux, periods) = (product("flux"), months(2000));
+    let step = |month: usize, value: f32| (periods[month], vec![value; GRID.cell_count()]);
+    let mut versions = vec![];
+    // The second version has the first month as it was, the third one has it revised.
+    for steps in [
+        vec![step(0, 1e-9)],
+        vec![step(0, 1e-9), step(1, 2e-9)],
+        vec![step(0, 3e-9), step(1, 2e-9)],
+    ] {
+        versions.push(land(&store, &flux, Quantity::CarbonFlux, GRID, &steps).await);
+    }
+    let young = [2, 3].map(|number| ObjectKey::manifest(&flux, number));
+    for key in store.list("").await.unwrap() {
+        if !young.contains(&key) {
+            let path = folder.path().join(key.as_str());
+            let file = File::options().append(true).open(&path).unwrap();
+            file.set_modified(SystemTime::now() - 3 * DAY).unwrap();
+        }
+    }
+    let plan = gc::plan(&store, &OWNERS, KEEP, in_days(0)).await.unwrap();
+    let keys: Vec<&ObjectKey> = plan.garbage.iter().map(|garbage| &garbage.key).collect();
+    assert_eq!(keys, [&ObjectKey::manifest(&flux, 1)]);
+    gc::run(&store, &OWNERS, &plan, KEEP, &|_done| ())
+        .await
+        .unwrap();
+    let revised = &versions[1].steps[0].field;
+    let values = fields::read(&store, revised, &GRID).await.unwrap();
+    assert_eq!(values[0], 1e-9);
+    // It goes with what only it names.
+    let plan = gc::plan(&store, &OWNERS, KEEP, in_days(2)).await.unwrap();
+    let keys: Vec<&ObjectKey> = plan.garbage.iter().map(|garbage| &garbage.key).collect();
+    assert_eq!(keys, [&ObjectKey::manifest(&flux, 2), revised]);
 }

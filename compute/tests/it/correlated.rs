@@ -343,7 +343,7 @@ async fn it_is_up_to_date_while_both_products_are_and_asked_for_once_follows_nei
     let newer = land(&store, &product("wind"), Quantity::WindSpeed, GRID, &newer).await;
     assert!(follow(&engine, &product("wind")).await.unwrap().is_empty());
     assert!(follow(&engine, &product("sst")).await.unwrap().is_empty());
-    let kept = Kept::read(&store, 1).await.unwrap();
+    let kept = Kept::read(&store, 1, i64::MAX).await.unwrap();
     let is_kept = |manifest: &Manifest| kept.manifests.iter().any(|own| own.id() == manifest.id());
     assert!(
         is_kept(&a) && is_kept(&b) && is_kept(&newer),

@@ -327,10 +327,13 @@ mod tests {
     #[test]
     fn a_large_chunk_is_kept_whatever_the_number_of_processors() {
         let chunks = Chunks::default();
-        let key = |col| ("sst".to_owned(), vec![0, col]);
+        let key = |col| ("sst".to_owned(), vec![0, col], false);
         for col in 0..2 {
-            let chunk = Arc::new(vec![0; 100 << 20]);
-            chunks.0.insert(key(col), Some(chunk));
+            let chunk = Chunk {
+                bytes: vec![0; 100 << 20],
+                lacking: vec![],
+            };
+            chunks.0.insert(key(col), Some(Arc::new(chunk)));
         }
         assert!((0..2).all(|col| chunks.0.get(&key(col)).is_some()));
         assert!(chunks.0.get(&key(2)).is_none());

@@ -215,6 +215,36 @@ async fn a_cube_of_a_version_that_is_gone_is_made_again() {
 }
 
 #[tokio::test]
+async fn a_state_whose_number_another_version_has_now_is_told_and_the_cube_made_again() {
+    let store = Store::memory();
+    let versions = three_versions(&store).await;
+    let product = "p".parse().unwrap();
+    let newest = ObjectKey::manifest(&product, 3);
+    store.remove(&newest).await.unwrap();
+    // The cube cannot follow what has its number, and follows the next one.
+    let other = version(&store, grid(40, 60), 3, &[(1, 10), (2, 5)]).await;
+    manifests::commit(&store, &other).await.unwrap();
+    follow(&store, &other).await.unwrap_err();
+    let next = version(&store, grid(40, 60), 4, &[(1, 10), (2, 6)]).await;
+    manifests::commit(&store, &next).await.unwrap();
+    follow(&store, &next).await.unwrap();
+    let checked = verify::check(&store, &product, &BTreeSet::new()).await;
+    let checked = checked.unwrap();
+    let [finding] = &checked.findings[..] else {
+        panic!("{checked:?}");
+    };
+    assert_eq!(finding.fault, Fault::Damaged);
+    for id in [versions[2].id(), other.id()] {
+        let is_named = finding.reason.contains(&id.to_string());
+        assert!(is_named, "{}", finding.reason);
+    }
+    assert!(verify::mend(&store, &product).await.unwrap());
+    let third = At::Version("3".to_owned());
+    holds(&store, third, &other, &[(1, 10), (2, 5)]).await;
+    holds(&store, At::Newest, &next, &[(1, 10), (2, 6)]).await;
+}
+
+#[tokio::test]
 async fn each_part_that_is_gone_or_damaged_is_told_and_the_cube_made_again() {
     let product = "p".parse().unwrap();
     let names = keys(&{

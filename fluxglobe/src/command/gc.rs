@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use anyhow::{Result, bail};
 use compute::gc::Computed;
+use cube::clean_up::Cleaned;
 use ingest::{LandingNotes, Readings};
 use observations::Datasets;
 use storage::gc::{self, Keep, Owner, Pictures, Versions};
@@ -92,13 +93,7 @@ async fn cubes(store: &Store, keep: Keep, is_dry_run: bool) -> Result<()> {
                 cube::folder(&cleaned.product),
                 cleaned.size_bytes
             ))?;
-            progress::say(&format!(
-                "{}: {} versions and {} objects of the cube{}",
-                cleaned.product,
-                cleaned.versions.len(),
-                cleaned.objects_count,
-                if is_dry_run { " would go" } else { " are gone" }
-            ));
+            progress::say(&told(&cleaned, is_dry_run));
         }
         if let Some(reason) = cleaned.refused {
             left.push(format!("{}: {reason}", cleaned.product));
@@ -113,10 +108,46 @@ async fn cubes(store: &Store, keep: Keep, is_dry_run: bool) -> Result<()> {
     Ok(())
 }
 
+/// What becomes of a cube. What its versions alone need is known once they have no names.
+fn told(cleaned: &Cleaned, is_dry_run: bool) -> String {
+    let (product, versions, objects) = (
+        &cleaned.product,
+        cleaned.versions.len(),
+        cleaned.objects_count,
+    );
+    let becomes = match (is_dry_run, versions) {
+        (false, _) => "are gone",
+        (true, 0) => "would go",
+        (true, _) => "would go, and what these versions alone need, which is not counted",
+    };
+    format!("{product}: {versions} versions and {objects} objects of the cube {becomes}")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use contract::kind::Kind;
+
+    #[test]
+    fn what_a_dry_run_cannot_count_of_a_cube_is_said() {
+        let mut cleaned = Cleaned {
+            product: "flux".parse().unwrap(),
+            versions: vec!["1".to_owned(), "2".to_owned()],
+            objects_count: 3,
+            size_bytes: 4,
+            refused: None,
+        };
+        assert_eq!(
+            told(&cleaned, false),
+            "flux: 2 versions and 3 objects of the cube are gone"
+        );
+        assert_eq!(
+            told(&cleaned, true),
+            "flux: 2 versions and 3 objects of the cube would go, and what these versions alone need, which is not counted"
+        );
+        cleaned.versions.clear();
+        assert!(told(&cleaned, true).ends_with("would go"));
+    }
 
     #[test]
     fn every_kind_of_object_has_one_owner_or_is_never_removed() {

@@ -46,7 +46,7 @@ impl Values {
     /// band needs too.
     pub(crate) fn chunk_starts(&self, variable: &str, axis: usize) -> Result<Vec<u64>, Stop> {
         match self {
-            Self::Process(_) => Ok(vec![]),
+            Self::Process(..) => Ok(vec![]),
             Self::Arrays(arrays) => arrays.chunk_starts(variable, axis).map_err(stopped),
         }
     }

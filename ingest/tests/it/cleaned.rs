@@ -80,6 +80,7 @@ async fn what_references_that_cannot_be_read_refer_to_stays() {
         versions: 1,
         pinned: vec![],
         only_pinned_count: 0,
+        oldest_ms: i64::MAX,
     };
     let in_use = Versions.in_use(&own.store, &kept).await.unwrap();
     assert!(in_use.contains(&attachment));

@@ -112,20 +112,25 @@ pub(super) async fn datasets(store: &Store) -> Result<Vec<ProductId>, Observatio
     Ok(names.iter().filter_map(|name| name.parse().ok()).collect())
 }
 
-/// The newest indexes of every dataset and the files that they name, as keys.
+/// The newest indexes of every dataset, those that were written at an instant or later, ms, and the files that they name, as keys.
 ///
 /// # Errors
 /// An index that cannot be read: it names files that nobody knows.
 pub(crate) async fn named_by_newest(
     store: &Store,
     versions: usize,
+    oldest_ms: i64,
 ) -> Result<BTreeSet<ObjectKey>, StorageError> {
     let mut keys = BTreeSet::new();
     for dataset in store.folders(Kind::ObservationIndex.folder()).await? {
         let indexes = store
-            .list(&format!("{}/{dataset}", Kind::ObservationIndex.folder()))
+            .list_written(&format!("{}/{dataset}", Kind::ObservationIndex.folder()))
             .await?;
-        for key in indexes.into_iter().rev().take(versions) {
+        let newest = indexes.len().saturating_sub(versions);
+        for (place, (key, written)) in indexes.into_iter().enumerate() {
+            if place < newest && written.ms() < oldest_ms {
+                continue;
+            }
             let Some(index) = document::get::<Index>(store, &key).await? else {
                 continue;
             };

@@ -1,5 +1,6 @@
 //! Clean-up of files of observations.
 
+use std::fs::File;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use contract::observation::Observation;
@@ -69,6 +70,30 @@ async fn old_indexes_go_with_the_files_that_only_they_name() {
     let page = home.query(&observations::Filter::default()).await.unwrap();
     let values: Vec<f64> = page.observations.iter().map(|o| o.value).collect();
     assert_eq!(values, [291.0, 290.0]);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn an_index_that_stays_for_its_age_keeps_the_files_that_it_names() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(folder.path().to_str().unwrap()).unwrap();
+    let home = FileStore::new(store.clone());
+    // The second index names January as it was, the third one as it was revised.
+    for (minute, value) in [(0, 290.0), (NEXT_MONTH, 290.0), (0, 291.0)] {
+        let row = observation("a", minute, value);
+        home.upsert(&[row]).await.unwrap();
+    }
+    let index = |number: u32| format!("observation-indexes/buoys/{number:010}.json");
+    let young = [index(2), index(3)];
+    for key in store.list("").await.unwrap() {
+        if !young.contains(&key.to_string()) {
+            let path = folder.path().join(key.as_str());
+            let file = File::options().append(true).open(&path).unwrap();
+            let age = Duration::from_hours(72);
+            file.set_modified(SystemTime::now() - age).unwrap();
+        }
+    }
+    assert_eq!(doomed(&store, 0).await, [index(1)]);
+    assert_eq!(doomed(&store, 2).await[..2], [index(1), index(2)]);
 }
 
 #[tokio::test(flavor = "multi_thread")]

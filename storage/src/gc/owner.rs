@@ -7,6 +7,7 @@ use async_trait::async_trait;
 use contract::key::ObjectKey;
 use contract::kind::Kind;
 use contract::manifest::{Manifest, ManifestId};
+use contract::product::ProductId;
 
 use crate::{StorageError, Store, manifests, pins};
 
@@ -52,8 +53,10 @@ pub trait Owner: Send + Sync {
 pub struct Kept {
     /// The newest versions of every product, those that are pinned and, so that they stay readable, those that they were derived from.
     pub manifests: Vec<Manifest>,
-    /// How many of the newest are kept of every numbered list, at least one.
+    /// How many of the newest are kept of every numbered list, at least one; none where it is asked about one version alone.
     pub versions: usize,
+    /// What was written to such a list at this instant or later, ms, stays as well.
+    pub oldest_ms: i64,
     /// Versions that are pinned, whether they are there or not.
     pub pinned: Vec<ManifestId>,
     /// How many of these are there and would not be kept for being new.
@@ -65,7 +68,11 @@ impl Kept {
     ///
     /// # Errors
     /// A store that does not answer; a pin or a manifest that cannot be read.
-    pub async fn read(store: &Store, versions: usize) -> Result<Self, StorageError> {
+    pub async fn read(
+        store: &Store,
+        versions: usize,
+        oldest_ms: i64,
+    ) -> Result<Self, StorageError> {
         let (mut kept, mut only_pinned_count) = (vec![], 0);
         // A pin or a list that cannot be read names things that nobody knows: nothing may be removed.
         let pins = pins::all(store).await?;
@@ -79,15 +86,7 @@ impl Kept {
                 only_pinned_count += usize::from(is_old && there.contains(&pin.number));
             }
             for number in numbers.into_iter().rev() {
-                let Some(manifest) = manifests::numbered(store, &product, number).await? else {
-                    continue;
-                };
-                let computed = manifest.computed.iter().flat_map(|it| &it.inputs);
-                let sources = computed.map(|input| &input.manifest);
-                for source in manifest.derived_from.iter().chain(sources) {
-                    kept.extend(manifests::numbered(store, &source.product, source.number).await?);
-                }
-                kept.push(manifest);
+                kept.extend(with_sources(store, &product, number).await?);
             }
         }
         let manifests = kept;
@@ -96,6 +95,53 @@ impl Kept {
             versions,
             pinned,
             only_pinned_count,
+            oldest_ms,
         })
     }
+
+    /// Versions that are none of the newest ones and stay, since they are young.
+    pub(super) async fn young(&self, store: &Store) -> Result<Vec<(ProductId, u64)>, StorageError> {
+        let mut young = vec![];
+        for product in manifests::products(store).await? {
+            let published = manifests::published(store, &product).await?;
+            let before_newest = published.iter().rev().skip(self.versions);
+            let stay = before_newest.filter(|(_, written)| written.ms() >= self.oldest_ms);
+            young.extend(stay.map(|(number, _)| (product.clone(), *number)));
+        }
+        Ok(young)
+    }
+
+    /// One version alone, and those that it was derived from.
+    pub(super) async fn one(
+        store: &Store,
+        product: &ProductId,
+        number: u64,
+    ) -> Result<Self, StorageError> {
+        Ok(Self {
+            manifests: with_sources(store, product, number).await?,
+            versions: 0,
+            oldest_ms: i64::MAX,
+            pinned: vec![],
+            only_pinned_count: 0,
+        })
+    }
+}
+
+/// A version behind those that it was derived from; nothing if clean-up took it meanwhile.
+async fn with_sources(
+    store: &Store,
+    product: &ProductId,
+    number: u64,
+) -> Result<Vec<Manifest>, StorageError> {
+    let mut found = vec![];
+    let Some(manifest) = manifests::numbered(store, product, number).await? else {
+        return Ok(found);
+    };
+    let computed = manifest.computed.iter().flat_map(|it| &it.inputs);
+    let sources = computed.map(|input| &input.manifest);
+    for source in manifest.derived_from.iter().chain(sources) {
+        found.extend(manifests::numbered(store, &source.product, source.number).await?);
+    }
+    found.push(manifest);
+    Ok(found)
 }

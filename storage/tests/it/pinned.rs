@@ -71,6 +71,7 @@ async fn publish(store: &Store, name: &str, number: u64, source: Option<Manifest
             masked: None,
         }],
         domain: domain::write(store, &id, &cells).await.unwrap(),
+        indexes: vec![],
         series: vec![],
         derived_from: source,
         computed: None,

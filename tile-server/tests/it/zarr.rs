@@ -7,6 +7,7 @@ use async_trait::async_trait;
 use axum::body::{Body, to_bytes};
 use axum::http::{Request, StatusCode, header};
 use contract::digest::Digest;
+use contract::key::ObjectKey;
 use contract::manifest::{MANIFEST_SCHEMA, Manifest, Step};
 use contract::quantity::{Flag, OpenQuantity, OpenWords, Quantity};
 use contract::time::Period;
@@ -268,6 +269,20 @@ async fn a_version_stays_what_it_is_and_the_newest_becomes_another() {
     let digest = id.to_string();
     let digest = digest.strip_prefix("flux").unwrap();
     assert_eq!(app.get(&path(digest)).await.body, second.body);
+}
+
+#[tokio::test]
+async fn a_number_that_another_version_has_now_is_not_answered_with_the_old_one() {
+    let app = TestApp::new().await;
+    app.land("flux", Quantity::CarbonFlux, 2).await;
+    let taken = ObjectKey::manifest(&"flux".parse().unwrap(), 2);
+    app.store.remove(&taken).await.unwrap();
+    let (quantity, number) = (Quantity::CarbonFlux, 2);
+    app.land_last_month("flux", quantity, number, None).await;
+    let answer = app.get("/zarr/flux@2/zarr.json").await;
+    assert_eq!(answer.status, StatusCode::NOT_FOUND, "{}", answer.text());
+    let answer = app.get("/zarr/flux@1/zarr.json").await;
+    assert_eq!(answer.status, StatusCode::OK, "{}", answer.text());
 }
 
 /// A store of others that nobody needs to read.
