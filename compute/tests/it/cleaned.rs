@@ -119,7 +119,7 @@ async fn a_version_that_stays_for_its_age_keeps_all_that_it_is_made_of() {
         .unwrap();
     let revised = &versions[1].steps[0].field;
     let values = fields::read(&store, revised, &GRID).await.unwrap();
-    assert_eq!(values[0], 1e-9);
+    assert_eq!(values[0].to_bits(), 1e-9_f32.to_bits());
     // It goes with what only it names.
     let plan = gc::plan(&store, &OWNERS, KEEP, in_days(2)).await.unwrap();
     let keys: Vec<&ObjectKey> = plan.garbage.iter().map(|garbage| &garbage.key).collect();

@@ -118,6 +118,24 @@ fn summary(report: &Report) -> String {
     )
 }
 
+/// Made again by `recompute --verify`.
+const MADE_AGAIN: [Kind; 6] = [
+    Kind::Field,
+    Kind::Contributed,
+    Kind::Domain,
+    Kind::Cube,
+    Kind::Sums,
+    Kind::Tile,
+];
+/// Made again when they are next needed.
+const WHEN_NEEDED: [Kind; 5] = [
+    Kind::Weights,
+    Kind::Accumulating,
+    Kind::Check,
+    Kind::Reading,
+    Kind::Landing,
+];
+
 /// What to do about what was found.
 fn advice(report: &Report) -> Vec<String> {
     let mut advice = vec![];
@@ -126,28 +144,13 @@ fn advice(report: &Report) -> Vec<String> {
             |finding: &&Finding| Kind::of(&finding.key).is_some_and(|it| kinds.contains(&it));
         report.findings.iter().find(is_of)
     };
-    let made_again = [
-        Kind::Field,
-        Kind::Contributed,
-        Kind::Domain,
-        Kind::Cube,
-        Kind::Sums,
-        Kind::Tile,
-    ];
-    if found(&made_again).is_some() {
+    if found(&MADE_AGAIN).is_some() {
         advice.push(
             "fields, counts, domains, cubes, sums and tiles are made again by: fluxglobe recompute --product PRODUCT --verify; what an attached product refers to, where its store has changed, by: fluxglobe attach --refresh PRODUCT, and where it has moved, by: fluxglobe attach URL --variable NAME --product PRODUCT --replace"
                 .to_owned(),
         );
     }
-    let when_needed = [
-        Kind::Weights,
-        Kind::Accumulating,
-        Kind::Check,
-        Kind::Reading,
-        Kind::Landing,
-    ];
-    if found(&when_needed).is_some() {
+    if found(&WHEN_NEEDED).is_some() {
         advice.push("weights, kept sums, comparisons and notes of readings and landings are made again when they are next needed".to_owned());
     }
     if let Some(protocol) = found(&[Kind::Protocol]) {

@@ -61,7 +61,6 @@ impl Survey {
             meaning: own.as_ref().map(written::meaning),
             indexes: &asked,
         };
-        let is_synthetic = written::is_synthetic(&foreign.attributes);
         // What is not there is fill value: no data, if the conventions say that of it.
         let own = description.variable(variable);
         let packing = own.map(|own| plan::packing(own, profile)).transpose()?;
@@ -81,7 +80,7 @@ impl Survey {
         );
         let held = (Values::Arrays(values.clone()), &description);
         let mut plan = plan::plan(held, &file_name(&place), wish, limits).await?;
-        plan.target.synthetic |= is_synthetic;
+        plan.target.synthetic |= written::is_synthetic(&foreign.attributes);
         plan.assumptions
             .extend(values.assumptions().into_iter().map(plan::line));
         if plan.quality.is_some() {

@@ -116,11 +116,8 @@ pub(super) fn notices(
         &message.collection;
     let profile = profiles.of_collection(collection);
     let trace = printable(&message.identifier);
-    let noticed = message
-        .submission_time
-        .as_deref()
-        .and_then(time)
-        .or(Some(came));
+    let submitted = message.submission_time.as_deref().and_then(time);
+    let noticed = submitted.or(Some(came));
     let notice = |file: &&File| {
         let location = Location::parse(&file.uri);
         let shown = location.as_ref().map_or_else(

@@ -93,9 +93,9 @@ impl Kept {
         Ok(Self {
             manifests,
             versions,
+            oldest_ms,
             pinned,
             only_pinned_count,
-            oldest_ms,
         })
     }
 
