@@ -468,6 +468,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/zarr2/{product}/{key}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * The same arrays by keys of Zarr version 2, for programs that read no other, such as GDAL and QGIS: `.zmetadata` describes all
+         *     arrays. Coarser levels are left out.
+         */
+        get: operations["zarr2"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
 }
 export type webhooks = Record<string, never>;
 export interface components {
@@ -5967,6 +5987,114 @@ export interface operations {
                 /** @description Product, or a version of it, `PRODUCT@NUMBER` */
                 product: string;
                 /** @description Key of Zarr version 3, such as `zarr.json` or `time/c/0` */
+                key: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description The value of the key */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/octet-stream": unknown;
+                };
+            };
+            /** @description The bytes of it that `Range` asked for; with another tag in `If-Range` all of it is sent */
+            206: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/octet-stream": unknown;
+                };
+            };
+            /** @description The copy that the client has is right */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description A parameter is not valid, or missing; the reason says what would be */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description No such product, version or key, or a chunk without data */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description It has no such bytes */
+            416: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description A defect of this server */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description A store of others, to which the product is attached, does not hold what it held */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description Too much to do, or a part that is needed does not answer */
+            503: {
+                headers: {
+                    /** @description Seconds after which the same request may succeed */
+                    "retry-after"?: number;
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+            /** @description The answer took too long */
+            504: {
+                headers: {
+                    /** @description Seconds after which the same request may succeed */
+                    "retry-after"?: number;
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Refusal"];
+                };
+            };
+        };
+    };
+    zarr2: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description Product, or a version of it, `PRODUCT@NUMBER` */
+                product: string;
+                /** @description Key of Zarr version 2, such as `.zmetadata` or `time/0` */
                 key: string;
             };
             cookie?: never;
