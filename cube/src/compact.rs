@@ -51,10 +51,10 @@ pub fn compact<'a>(store: &'a Store, folder: &'a str) -> BoxFuture<'a, Result<us
     Box::pin(async move {
         let repository = Repository::open(store, folder).await?;
         let mut made = 0;
-        loop {
+        let cube = loop {
             let cube = repository.at(&At::Newest).await?;
             let Some(run) = cube.first_missing() else {
-                break;
+                break cube;
             };
             let compaction = Compaction {
                 repository: &repository,
@@ -66,8 +66,8 @@ pub fn compact<'a>(store: &'a Store, folder: &'a str) -> BoxFuture<'a, Result<us
             };
             let shards = compaction.shards().await?;
             made += usize::from(compaction.place(&shards).await?);
-        }
-        complete::complete(store, folder).await?;
+        };
+        complete::complete(&repository, cube).await?;
         Ok(made)
     })
 }
