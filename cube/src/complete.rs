@@ -18,7 +18,7 @@ use crate::levels::MadeOf;
 use crate::parts::{Parts, Sent, SentStep};
 use crate::state::State;
 use crate::step_bands::StepBands;
-use crate::{At, Cube, CubeError, Repository};
+use crate::{Cube, CubeError, Repository};
 
 /// Steps that are committed together.
 const STEPS_AT_ONCE: usize = 16;
@@ -57,7 +57,7 @@ pub(crate) async fn complete(repository: &Repository, mut cube: Cube) -> Result<
             return Ok(count);
         }
         count += made.len();
-        cube = repository.at(&At::Newest).await?;
+        cube = repository.newest().await?;
     }
 }
 
@@ -211,7 +211,7 @@ mod tests {
     use storage::Store;
 
     use super::*;
-    use crate::{Description, Edit, WholeField};
+    use crate::{At, Description, Edit, WholeField};
 
     /// Three rows of two chunks.
     const GRID: Grid = Grid {

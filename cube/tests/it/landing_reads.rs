@@ -1,15 +1,15 @@
-//! What one more step reads of a cube: its times and digests, each once.
+//! What one more step reads of a cube: its times and digests once each, and none of them where this process has committed the step before.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex};
 
 use contract::grid::Grid;
-use cube::{compact, follow};
+use cube::{At, Repository, compact, follow};
 use futures::FutureExt as _;
 use storage::Store;
 
 use crate::follow::version;
-use crate::product::grid;
+use crate::product::{grid, month};
 use crate::watched::watched;
 
 /// So many digests are more than a manifest holds in itself, and the last run waits for more steps before it is made anew.
@@ -46,9 +46,34 @@ async fn one_more_step_and_what_is_made_behind_it_reads_no_chunk_twice() {
     land(&store, grid, 1).await;
     assert_eq!(compact(&store, "cubes/p").await.unwrap(), 1);
     let (store, reads) = counted(&store);
+    // The state that the run was placed in is not one that this process holds the steps of.
     land(&store, grid, 2).await;
     assert_eq!(compact(&store, "cubes/p").await.unwrap(), 0);
     let reads = reads.lock().unwrap();
     assert!(!reads.is_empty(), "this test counts nothing");
     assert!(reads.values().all(|count| *count == 1), "{reads:?}");
+}
+
+#[tokio::test]
+async fn versions_one_after_the_other_read_no_times_and_digests_of_what_was_just_committed() {
+    let store = Store::memory();
+    let grid = grid(20, 30);
+    land(&store, grid, 1).await;
+    assert_eq!(compact(&store, "cubes/p").await.unwrap(), 1);
+    land(&store, grid, 2).await;
+    let (store, reads) = counted(&store);
+    for number in 3..6 {
+        land(&store, grid, number).await;
+        assert_eq!(compact(&store, "cubes/p").await.unwrap(), 0);
+    }
+    assert!(reads.lock().unwrap().is_empty(), "{reads:?}");
+    // Whoever opens it reads what is stored: the same steps.
+    let repository = Repository::open(&store, "cubes/p").await.unwrap();
+    let cube = repository.at(&At::Newest).await.unwrap();
+    let periods: Vec<_> = cube.steps().iter().map(|step| step.period).collect();
+    assert_eq!(periods, (1..=STEPS + 4).map(month).collect::<Vec<_>>());
+    assert!(
+        !reads.lock().unwrap().is_empty(),
+        "this test counts nothing"
+    );
 }
