@@ -120,7 +120,7 @@ impl Cube {
         let session = session.read().await;
         let runs = Runs::read(&session, &store, SERIES, place).await?;
         let sums = Sums::read(&session, &store, &description, place).await?;
-        let level_names = Levels::read(&session, &store, &description, place).await?;
+        let level_names = Levels::read(&session, &store, &description, &steps, place).await?;
         drop(session);
         let mut levels = vec![];
         if level_names.is_there {

@@ -59,7 +59,8 @@ impl State {
             let own = session.read().await;
             let runs = Runs::read(&own, &arrays, SERIES, &repository.place).await?;
             let sums = Sums::read(&own, &arrays, &description, &repository.place).await?;
-            let levels = Levels::read(&own, &arrays, &description, &repository.place).await?;
+            let levels =
+                Levels::read(&own, &arrays, &description, &steps, &repository.place).await?;
             drop(own);
             (Some(description), steps, runs, sums, levels)
         };
