@@ -93,7 +93,7 @@ impl LevelMaps {
 }
 
 impl Cube {
-    /// `known_steps` are those of the state, of who knows them.
+    /// Opens a state whose steps are read, unless the caller knows them.
     pub(crate) async fn open(
         session: Session,
         objects: &ObjectStorage,
