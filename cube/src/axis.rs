@@ -15,7 +15,7 @@ use crate::error::first_lines;
 use crate::{CubeError, Description};
 
 /// Chunks that are read at a time.
-const CHUNKS_AT_ONCE: usize = 8;
+pub(crate) const CHUNKS_AT_ONCE: usize = 8;
 /// Most steps that are read: every quarter of an hour of 280 years.
 const MOST_STEPS: u64 = 10_000_000;
 
@@ -256,7 +256,10 @@ fn unread<S: ?Sized>(array: &Array<S>, chunk: u64, reason: String) -> CubeError 
 }
 
 /// Reads a chunk along time as a whole, for then its checksum is compared; none if the array has none there.
-async fn read_chunk<S, T>(array: &Array<S>, chunk: u64) -> Result<Option<Vec<T>>, CubeError>
+pub(crate) async fn read_chunk<S, T>(
+    array: &Array<S>,
+    chunk: u64,
+) -> Result<Option<Vec<T>>, CubeError>
 where
     S: AsyncReadableStorageTraits + 'static,
     T: ElementOwned + Send + Sync,

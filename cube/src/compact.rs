@@ -25,7 +25,7 @@ use crate::layout::RUN_STEPS;
 use crate::series;
 use crate::state::State;
 use crate::sums::Basis;
-use crate::{At, Cube, CubeError, Repository, complete, placing};
+use crate::{Cube, CubeError, Repository, complete, placing};
 
 /// Steps whose windows are read at a time.
 const STEPS_AT_ONCE: usize = 16;
@@ -51,10 +51,10 @@ pub fn compact<'a>(store: &'a Store, folder: &'a str) -> BoxFuture<'a, Result<us
     Box::pin(async move {
         let repository = Repository::open(store, folder).await?;
         let mut made = 0;
-        loop {
-            let cube = repository.at(&At::Newest).await?;
+        let cube = loop {
+            let cube = repository.newest().await?;
             let Some(run) = cube.first_missing() else {
-                break;
+                break cube;
             };
             let compaction = Compaction {
                 repository: &repository,
@@ -66,8 +66,8 @@ pub fn compact<'a>(store: &'a Store, folder: &'a str) -> BoxFuture<'a, Result<us
             };
             let shards = compaction.shards().await?;
             made += usize::from(compaction.place(&shards).await?);
-        }
-        complete::complete(store, folder).await?;
+        };
+        complete::complete(&repository, cube).await?;
         Ok(made)
     })
 }
@@ -324,7 +324,7 @@ mod tests {
     use contract::time::{Period, TimeMs};
 
     use super::*;
-    use crate::{Description, Edit};
+    use crate::{At, Description, Edit};
 
     const GRID: Grid = Grid {
         rows: 9,

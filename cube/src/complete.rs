@@ -9,7 +9,6 @@ use contract::digest::Digest;
 use contract::level::Level;
 use icechunk::format::ChunkIndices;
 use icechunk::session::SessionErrorKind;
-use storage::Store;
 use zarrs_icechunk::AsyncIcechunkStore;
 
 use crate::edit::ATTEMPTS;
@@ -19,7 +18,7 @@ use crate::levels::MadeOf;
 use crate::parts::{Parts, Sent, SentStep};
 use crate::state::State;
 use crate::step_bands::StepBands;
-use crate::{At, Cube, CubeError, Repository};
+use crate::{Cube, CubeError, Repository};
 
 /// Steps that are committed together.
 const STEPS_AT_ONCE: usize = 16;
@@ -30,15 +29,13 @@ struct Made {
     sent: SentStep,
 }
 
-/// Gives the steps of the cube in a folder of a store levels that have none; of how many.
+/// Gives the steps of a cube levels that have none, from those of a state on that was the newest a moment ago; of how many.
 ///
 /// # Errors
-/// `Missing` if there is no cube. A chunk of a step that is damaged or gone: it gets none.
-pub(crate) async fn complete(store: &Store, folder: &str) -> Result<usize, CubeError> {
-    let repository = Repository::open(store, folder).await?;
+/// A chunk of a step that is damaged or gone: it gets none.
+pub(crate) async fn complete(repository: &Repository, mut cube: Cube) -> Result<usize, CubeError> {
     let mut count = 0;
     loop {
-        let cube = repository.at(&At::Newest).await?;
         let missing = cube.without_levels();
         if missing.is_empty() {
             return Ok(count);
@@ -56,10 +53,11 @@ pub(crate) async fn complete(store: &Store, folder: &str) -> Result<usize, CubeE
                 sent: parts.send(&session, &mut bands, Sent::Levels).await?,
             });
         }
-        if !placed(&repository, &cube, &parts, &made).await? {
+        if !placed(repository, &cube, &parts, &made).await? {
             return Ok(count);
         }
         count += made.len();
+        cube = repository.newest().await?;
     }
 }
 
@@ -210,9 +208,10 @@ mod tests {
     use contract::grid::Grid;
     use contract::quantity::Quantity;
     use contract::time::Period;
+    use storage::Store;
 
     use super::*;
-    use crate::{Description, Edit, WholeField};
+    use crate::{At, Description, Edit, WholeField};
 
     /// Three rows of two chunks.
     const GRID: Grid = Grid {

@@ -19,7 +19,7 @@ use crate::plain;
 use crate::plan::Plan;
 use crate::staged::{AllStaged, Staged};
 use crate::state::State;
-use crate::{CubeError, Description, Repository, Step};
+use crate::{CubeError, Description, Repository, Step, held_steps};
 
 /// How often a commit is laid on top of those of others.
 pub(crate) const ATTEMPTS: u32 = 50;
@@ -159,7 +159,12 @@ impl<'a> Edit<'a> {
         plan: &Plan,
         message: &str,
     ) -> Result<Option<String>, CubeError> {
-        self.layer(state, plan).commit(message).await
+        let committed = self.layer(state, plan).commit(message).await?;
+        if let Some(snapshot) = &committed {
+            let snapshots = (state.snapshot.as_str(), snapshot.as_str());
+            held_steps::committed(&self.repository.place, snapshots, &plan.steps);
+        }
+        Ok(committed)
     }
 
     /// Commits a plan over a state as a state of its own, which nothing leads to before it is named.

@@ -3,6 +3,7 @@
 //! Levels of a step carry the digest of the values that they were made of, and are those of the step in their place only where that
 //! is its digest: whoever changes steps without knowing of levels leaves some that nobody takes.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use contract::digest::Digest;
@@ -15,7 +16,7 @@ use zarrs::group::Group;
 use zarrs::storage::AsyncReadableStorageTraits;
 use zarrs_icechunk::AsyncIcechunkStore;
 
-use crate::arrays::{self, Definition, LEVELS};
+use crate::arrays::{self, DIGEST_BYTES, DIGEST_CHUNK, Definition, LEVELS};
 use crate::joining::Method;
 use crate::rounding::KEPT_BITS;
 use crate::{CubeError, Description, Step, axis, cf, group, names, plain};
@@ -46,11 +47,12 @@ pub(crate) struct Levels {
 }
 
 impl Levels {
-    /// Reads which there are.
+    /// Reads which there are. Digests that are by reference those of the steps of the state are not read again.
     pub(crate) async fn read<S>(
         session: &Session,
         store: &Arc<S>,
         description: &Description,
+        steps: &[Step],
         place: &str,
     ) -> Result<Self, CubeError>
     where
@@ -71,7 +73,9 @@ impl Levels {
                 ..Self::default()
             });
         }
-        let names = names::read(store, &arrays::level_names(1)?, place).await?;
+        let shared = shared_chunks(session, description, steps.len()).await?;
+        let known = |chunk: u64| shared.contains(&chunk).then(|| digests(chunk, steps));
+        let names = names::read(store, &arrays::level_names(1)?, place, &known).await?;
         let ranges = arrays::level_ranges(1)?;
         // Zeros alone are not stored: of steps that have no levels yet, or no other value.
         let ranges: Vec<f32> = axis::read_array(store, &ranges, place, Some(0.0)).await?;
@@ -211,6 +215,42 @@ impl Levels {
         }
         Ok(())
     }
+}
+
+/// Chunks of digests of levels that are those of the steps themselves: [`Levels::write`] refers to them.
+async fn shared_chunks(
+    session: &Session,
+    description: &Description,
+    steps: usize,
+) -> Result<BTreeSet<u64>, CubeError> {
+    let names = arrays::level_names(1)?;
+    let own = arrays::axis(description.is_sum(), 1)?.digests;
+    let [names_path, own_path] =
+        [&names, &own].map(|array| path(array.path().as_str().trim_start_matches('/')));
+    let (names_path, own_path) = (names_path?, own_path?);
+    let mut shared = BTreeSet::new();
+    for chunk in 0..steps.div_ceil(axis::chunk_steps(&names)?) {
+        // What cannot be looked up is told of when it is read.
+        let at = index(&names, chunk);
+        let Ok(Some(there)) = session.get_chunk_ref(&names_path, &at).await else {
+            continue;
+        };
+        let own = session.get_chunk_ref(&own_path, &at).await;
+        if own.is_ok_and(|own| own == Some(there)) {
+            shared.insert(chunk as u64);
+        }
+    }
+    Ok(shared)
+}
+
+/// A chunk of digests of steps as it is stored: zeros behind the last one.
+fn digests(chunk: u64, steps: &[Step]) -> Vec<u8> {
+    let in_chunk = DIGEST_CHUNK as usize;
+    let own = steps.iter().skip(chunk as usize * in_chunk).take(in_chunk);
+    let bytes = own.flat_map(|step| *step.values_sha256.as_bytes());
+    let mut bytes: Vec<u8> = bytes.collect();
+    bytes.resize((DIGEST_CHUNK * DIGEST_BYTES) as usize, 0);
+    bytes
 }
 
 /// Writes what an array is like.

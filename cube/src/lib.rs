@@ -27,6 +27,7 @@ mod follow;
 pub mod foreign;
 mod group;
 mod handing;
+mod held_steps;
 mod joined;
 mod joining;
 mod keys;

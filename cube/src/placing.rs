@@ -70,6 +70,10 @@ pub(crate) async fn place(
     (steps, mut sent): (&[Step], Vec<SentRun>),
 ) -> Result<(), CubeError> {
     let failed = |e: &dyn std::fmt::Display| repository.failed("placing a series", e);
+    // Most versions have none, and a state takes as long to read as its cube has steps.
+    if sent.is_empty() {
+        return Ok(());
+    }
     for _attempt in 0..ATTEMPTS {
         let state = State::newest(repository).await?;
         if !state.describes_same_cells(description) {

@@ -93,11 +93,19 @@ impl LevelMaps {
 }
 
 impl Cube {
-    pub(crate) async fn open(session: Session, objects: &ObjectStorage) -> Result<Self, CubeError> {
+    /// Opens a state whose steps are read, unless the caller knows them.
+    pub(crate) async fn open(
+        session: Session,
+        objects: &ObjectStorage,
+        known_steps: Option<Vec<Step>>,
+    ) -> Result<Self, CubeError> {
         let place = &objects.to_string();
         let store = Arc::new(AsyncIcechunkStore::new(session));
         let description = Description::of_group(&store, place).await?;
-        let steps = axis::read(&store, &description, place).await?;
+        let steps = match known_steps {
+            Some(steps) => steps,
+            None => axis::read(&store, &description, place).await?,
+        };
         let definition = arrays::values(&description, steps.len() as u64)?;
         let cut = (&description.grid, Layout::of(&description.grid));
         let values = Maps::open(&store, definition, cut, place).await?;
@@ -112,7 +120,7 @@ impl Cube {
         let session = session.read().await;
         let runs = Runs::read(&session, &store, SERIES, place).await?;
         let sums = Sums::read(&session, &store, &description, place).await?;
-        let level_names = Levels::read(&session, &store, &description, place).await?;
+        let level_names = Levels::read(&session, &store, &description, &steps, place).await?;
         drop(session);
         let mut levels = vec![];
         if level_names.is_there {

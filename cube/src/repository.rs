@@ -18,7 +18,7 @@ use tokio::sync::RwLock;
 use zarrs_icechunk::AsyncIcechunkStore;
 
 use crate::object_storage::ObjectStorage;
-use crate::{Cube, CubeError, Description, Layout, plain};
+use crate::{Cube, CubeError, Description, Layout, held_steps, plain};
 
 /// The branch that commits go to.
 pub(crate) const BRANCH: &str = "main";
@@ -209,8 +209,17 @@ impl Repository {
                     return Err(self.failed("reading a version", &error));
                 }
             };
-            Cube::open(session, &self.objects).await
+            Cube::open(session, &self.objects, None).await
         })
+    }
+
+    /// The newest state for what is made of it behind whoever lands versions: steps that this process has committed are not read again.
+    pub(crate) async fn newest(&self) -> Result<Cube, CubeError> {
+        let version = VersionInfo::BranchTipRef(BRANCH.to_owned());
+        let session = self.inner.readonly_session(&version).await;
+        let session = session.map_err(|e| self.failed("reading the newest state", &e))?;
+        let steps = held_steps::of(&self.place, &session.snapshot_id().to_string());
+        Cube::open(session, &self.objects, steps).await
     }
 
     /// Names a state for good: what cites it is answered the same ever after. Nothing is done if it has that name.

@@ -43,7 +43,7 @@ impl Runs {
             }
             Err(e) => return Err(CubeError::library(place, "looking for the series", e)),
         }
-        names::read(arrays, &arrays::runs(group, 1)?, place)
+        names::read(arrays, &arrays::runs(group, 1)?, place, &|_chunk| None)
             .await
             .map(Self)
     }

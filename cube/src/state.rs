@@ -11,7 +11,7 @@ use crate::arrays::SERIES;
 use crate::levels::Levels;
 use crate::series::Runs;
 use crate::sums::Sums;
-use crate::{CubeError, Description, Repository, Step, axis, cf};
+use crate::{CubeError, Description, Repository, Step, axis, cf, held_steps};
 
 /// What is there, and a session that changes it.
 pub(crate) struct State {
@@ -52,11 +52,15 @@ impl State {
             )
         } else {
             let description = Description::of_group(&arrays, &repository.place).await?;
-            let steps = axis::read(&arrays, &description, &repository.place).await?;
+            let steps = match held_steps::of(&repository.place, &snapshot) {
+                Some(steps) => steps,
+                None => axis::read(&arrays, &description, &repository.place).await?,
+            };
             let own = session.read().await;
             let runs = Runs::read(&own, &arrays, SERIES, &repository.place).await?;
             let sums = Sums::read(&own, &arrays, &description, &repository.place).await?;
-            let levels = Levels::read(&own, &arrays, &description, &repository.place).await?;
+            let levels =
+                Levels::read(&own, &arrays, &description, &steps, &repository.place).await?;
             drop(own);
             (Some(description), steps, runs, sums, levels)
         };

@@ -4,6 +4,8 @@ mod over_time;
 mod pages;
 mod published;
 
+use std::collections::BTreeMap;
+
 use contract::digest::Digest;
 use contract::key::ObjectKey;
 use contract::kind::Kind;
@@ -46,6 +48,18 @@ pub async fn latest(store: &Store, product: &ProductId) -> Result<Option<Manifes
     };
     store.newest.insert(product.clone(), newest);
     numbered(store, product, newest).await
+}
+
+/// Products that have a manifest, sorted by name, with the number of their newest one: one list for all, and not one for each.
+pub async fn newest_numbers(store: &Store) -> Result<BTreeMap<ProductId, u64>, StorageError> {
+    let mut newest: BTreeMap<ProductId, u64> = BTreeMap::new();
+    for key in store.list(Kind::Manifest.folder()).await? {
+        if let (Some(product), Some(number)) = (product_of(&key), number_of(&key)) {
+            let own = newest.entry(product).or_insert(number);
+            *own = number.max(*own);
+        }
+    }
+    Ok(newest)
 }
 
 /// The newest manifest of a product if it is newer than the number that the caller knows: one small request where it is not and
@@ -100,6 +114,13 @@ pub async fn numbers(store: &Store, product: &ProductId) -> Result<Vec<u64>, Sto
         .list(&format!("{}/{product}", Kind::Manifest.folder()))
         .await?;
     Ok(keys.iter().filter_map(number_of).collect())
+}
+
+/// The product whose manifest has a key.
+fn product_of(key: &ObjectKey) -> Option<ProductId> {
+    let own = key.as_str().strip_prefix(Kind::Manifest.folder())?;
+    let (product, _name) = own.strip_prefix('/')?.split_once('/')?;
+    product.parse().ok()
 }
 
 /// The number that the key of a manifest ends in.
@@ -305,6 +326,29 @@ mod tests {
         let old = manifest(2, "t");
         assert_eq!(load(&store, &old.id()).await.unwrap(), old);
         assert_eq!(products(&store).await.unwrap(), [product]);
+    }
+
+    #[tokio::test]
+    async fn the_newest_numbers_of_all_products_are_found_in_one_list() {
+        let store = Store::memory();
+        assert!(newest_numbers(&store).await.unwrap().is_empty());
+        for (name, numbers) in [("q", 1..=12), ("p", 3..=3), ("a-b", 9..=10)] {
+            for number in numbers {
+                let mut own = manifest(number, name);
+                own.product = name.parse().unwrap();
+                commit(&store, &own).await.unwrap();
+            }
+        }
+        let mut each = BTreeMap::new();
+        for product in products(&store).await.unwrap() {
+            let newest = latest(&store, &product).await.unwrap().unwrap();
+            each.insert(product, newest.number);
+        }
+        assert_eq!(each.values().copied().collect::<Vec<_>>(), [10, 3, 12]);
+        let (counted, traffic) = store.counted();
+        assert_eq!(newest_numbers(&counted).await.unwrap(), each);
+        let counts = traffic.counts();
+        assert_eq!((counts.lists, counts.reads, counts.heads), (1, 0, 0));
     }
 
     /// A manifest of so many days.

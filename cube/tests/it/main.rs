@@ -7,6 +7,7 @@ mod damage;
 mod follow;
 mod frozen;
 mod kept;
+mod landing_reads;
 mod levels;
 mod migrate;
 mod plain;

@@ -6,6 +6,7 @@ use comfy_table::presets::NOTHING;
 use compute::dependents::why_it_stays;
 use contract::listing::ListedProduct;
 use contract::time::TimeMs;
+use storage::manifests;
 
 use crate::cli::{Products, Settings};
 use crate::instants::{self, Instants};
@@ -56,8 +57,13 @@ fn codes(row: &ListedProduct) -> Option<String> {
 pub(crate) async fn run(settings: &Settings, options: &Products) -> Result<()> {
     let store = deployment::store(settings)?;
     let (mut rows, mut staying) = (vec![], vec![]);
-    for product in storage::manifests::products(&store).await? {
-        let Some(manifest) = storage::manifests::latest(&store, &product).await? else {
+    for (product, number) in manifests::newest_numbers(&store).await? {
+        let newest = match manifests::numbered(&store, &product, number).await? {
+            // Clean-up took it away meanwhile: there is a newer one.
+            None => manifests::latest(&store, &product).await?,
+            newest => newest,
+        };
+        let Some(manifest) = newest else {
             continue;
         };
         staying.extend(why_it_stays(&manifest));
