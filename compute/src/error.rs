@@ -7,13 +7,14 @@ use contract::quantity::Quantity;
 use datafusion::error::DataFusionError;
 use storage::StorageError;
 
+use crate::close_name::close_name;
 use crate::failure::{self, Failure};
 
 /// A computation that gave no answer.
 #[derive(Debug, thiserror::Error)]
 pub enum ComputeError {
     /// No manifest for the product.
-    #[error("product {product:?} is unknown; there is {}", list(.known))]
+    #[error("product {product:?} is unknown{}; there is {}", meant(.product, .known), list(.known))]
     UnknownProduct {
         /// What was asked for.
         product: String,
@@ -302,6 +303,12 @@ fn retryable_if(may_pass: bool) -> ErrorClass {
     }
 }
 
+/// Which of those that there are was meant, if one is close.
+fn meant(product: &str, known: &[ProductId]) -> String {
+    let close = close_name(product, known.iter().map(ProductId::as_str));
+    close.map_or_else(String::new, |name| format!(" (did you mean {name}?)"))
+}
+
 fn list(known: &[ProductId]) -> String {
     let names: Vec<_> = known.iter().map(ProductId::as_str).collect();
     if names.is_empty() {
@@ -324,6 +331,12 @@ mod tests {
         };
         assert_eq!(error.to_string(), "product \"c\" is unknown; there is a, b");
         assert_eq!(error.class(), ErrorClass::NotFound);
+        let error = ComputeError::UnknownProduct {
+            product: "flx".into(),
+            known: vec!["flux".parse().unwrap(), "sst".parse().unwrap()],
+        };
+        let told = "product \"flx\" is unknown (did you mean flux?); there is flux, sst";
+        assert_eq!(error.to_string(), told);
     }
 
     #[test]

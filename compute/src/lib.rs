@@ -10,6 +10,7 @@ mod awaited;
 pub mod budget;
 pub mod catalogue;
 pub mod check;
+mod close_name;
 pub mod cluster;
 mod complete_sums;
 pub mod computed;
@@ -51,6 +52,7 @@ mod workshop;
 
 pub use budget::budget;
 pub use check::compare;
+pub use close_name::close_name;
 pub use cluster::SchedulerUrl;
 pub use derive::{DeriveProgress, derive_accumulated};
 pub use error::{ComputeError, ErrorClass};

@@ -16,6 +16,7 @@ use serde::Serialize;
 use storage::gc::{Keep, Kept, LEAST_AGE};
 use storage::{Store, manifests};
 
+use crate::repository::{BRANCH, is_no_tag};
 use crate::{CubeError, Repository, folder, verify};
 
 /// Snapshots that are read at a time.
@@ -165,7 +166,7 @@ impl Repository {
         let failed = |e: &dyn std::fmt::Display| self.failed("cleaning up", e);
         let newest: SnapshotId = self
             .inner
-            .lookup_branch(crate::repository::BRANCH)
+            .lookup_branch(BRANCH)
             .await
             .map_err(|e| failed(&e))?;
         // A name that was taken cannot be given again, and whoever follows names the state that is there.
@@ -176,26 +177,10 @@ impl Repository {
             if kept.contains(&version) || own.as_ref() == Some(&version) {
                 continue;
             }
-            let id = self
-                .inner
-                .lookup_tag(&version)
-                .await
-                .map_err(|e| failed(&e))?;
-            let info = self
-                .inner
-                .lookup_snapshot(&id)
-                .await
-                .map_err(|e| failed(&e))?;
-            if id == newest || info.flushed_at >= older_than {
-                continue;
+            let cutting = self.cut_name(&version, &newest, older_than, is_dry_run);
+            if cutting.await? {
+                cut.push(version);
             }
-            if !is_dry_run {
-                self.inner
-                    .delete_tag(&version)
-                    .await
-                    .map_err(|e| failed(&e))?;
-            }
-            cut.push(version);
         }
         if !is_dry_run {
             let config = self.inner.config();
@@ -210,6 +195,38 @@ impl Repository {
             expired.await.map_err(|e| failed(&e))?;
         }
         Ok(cut)
+    }
+
+    /// Takes the name of a version, unless its state is the newest or young. False if it stays, or went meanwhile: somebody else cleans up, too.
+    async fn cut_name(
+        &self,
+        version: &str,
+        newest: &SnapshotId,
+        older_than: DateTime<Utc>,
+        is_dry_run: bool,
+    ) -> Result<bool, CubeError> {
+        let failed = |e: &dyn std::fmt::Display| self.failed("cleaning up", e);
+        let id = match self.inner.lookup_tag(version).await {
+            Err(error) if is_no_tag(&error) => return Ok(false),
+            found => found.map_err(|e| failed(&e))?,
+        };
+        let info = self.inner.lookup_snapshot(&id).await;
+        let info = info.map_err(|e| failed(&e));
+        // A state goes after its name.
+        if info.is_err() && !self.has_version(version).await? {
+            return Ok(false);
+        }
+        let info = info?;
+        if id == *newest || info.flushed_at >= older_than {
+            return Ok(false);
+        }
+        if is_dry_run {
+            return Ok(true);
+        }
+        match self.inner.delete_tag(version).await {
+            Err(error) if is_no_tag(&error) => Ok(false),
+            deleted => deleted.map(|()| true).map_err(|e| failed(&e)),
+        }
     }
 
     /// Removes objects older than an instant that no state needs: how many, and their bytes.

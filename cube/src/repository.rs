@@ -292,7 +292,7 @@ impl Repository {
 }
 
 /// Does it say that there is no such tag?
-fn is_no_tag(error: &RepositoryError) -> bool {
+pub(crate) fn is_no_tag(error: &RepositoryError) -> bool {
     matches!(
         error.kind,
         RepositoryErrorKind::Ref(RefErrorKind::RefNotFound(_))

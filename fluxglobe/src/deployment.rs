@@ -200,10 +200,17 @@ pub(crate) async fn manifest(store: &Store, product: &ProductId, data: &Path) ->
         );
     }
     bail!(
-        "there is no product {product}; there are {}{}",
+        "there is no product {product}{}; there are {}{}",
+        meant(product, &known),
         known.join(", "),
         made_by(product, &known)
     )
+}
+
+/// Which of the products that are there was meant, if one is close.
+fn meant(product: &ProductId, known: &[String]) -> String {
+    let close = compute::close_name(product.as_str(), known.iter().map(String::as_str));
+    close.map_or_else(String::new, |name| format!(" (did you mean {name}?)"))
 }
 
 /// What makes the product that is not there, where one that is there has it made.
@@ -246,6 +253,14 @@ mod tests {
         assert!(of("flux-accumulated").contains("derive accumulated --product flux`"));
         assert_eq!(of("flx-accumulated"), "");
         assert_eq!(of("flx"), "");
+    }
+
+    #[test]
+    fn the_product_that_was_meant_is_named() {
+        let known = ["flux".to_owned(), "sst".to_owned()];
+        let of = |name: &str| meant(&name.parse().unwrap(), &known);
+        assert_eq!(of("flx"), " (did you mean flux?)");
+        assert_eq!(of("nothing"), "");
     }
 
     #[tokio::test]

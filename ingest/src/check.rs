@@ -8,6 +8,7 @@ use contract::time::Period;
 
 use crate::decode::DecodedBand;
 use crate::error::Rejection;
+use crate::figures::figures;
 use crate::plan::cf::unmarked::Ends;
 
 /// Share of the valid values that may be implausible (and is masked); more than that is a wrong unit or a wrong scale.
@@ -86,12 +87,13 @@ impl Found {
         let implausible = self.masked.implausible;
         let all = self.valid_cells + implausible;
         if implausible as f64 > MAX_IMPLAUSIBLE_SHARE * all as f64 {
-            let (plausible, example) = (quantity.plausible(), self.example);
+            let plausible = quantity.plausible();
             let detail = format!(
-                "has {implausible} of {all} values outside {:e} to {:e} {} in {period}, such as {example:e}; correct unit, scale or fill value in a profile",
-                plausible.start(),
-                plausible.end(),
-                quantity.unit()
+                "has {implausible} of {all} values outside {} to {} {} in {period}, such as {}; correct unit, scale or fill value in a profile",
+                figures(*plausible.start()),
+                figures(*plausible.end()),
+                quantity.unit(),
+                figures(self.example)
             );
             return Err(Rejection::new(RejectReason::Values, variable, detail));
         }
@@ -154,7 +156,9 @@ mod tests {
     fn many_implausible_values_refuse_the_file_wherever_they_are() {
         let rejection = check(&[50.0; 100], 100).unwrap_err();
         assert_eq!(rejection.reason, RejectReason::Values);
-        assert!(rejection.detail.contains("100 of 100"), "{rejection}");
+        let told = "has 100 of 100 values outside 0 to 1 ";
+        assert!(rejection.detail.contains(told), "{rejection}");
+        assert!(rejection.detail.contains("such as 50;"), "{rejection}");
         assert!(check(&[f32::INFINITY; 3], 3).is_err());
         // Six of a hundred, all of them in one band or one in each.
         let few = |at: fn(usize) -> bool| {

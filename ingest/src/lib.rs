@@ -21,6 +21,7 @@ mod decode;
 mod encode;
 mod error;
 mod fetch;
+mod figures;
 mod generate;
 mod ingestd;
 mod inspect;

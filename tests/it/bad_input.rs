@@ -72,6 +72,23 @@ fn a_survey_of_nothing_and_one_in_which_nothing_would_land_fail() {
 }
 
 #[test]
+fn a_survey_warns_of_nothing_about_what_it_throws_away() {
+    let place = tempfile::tempdir().unwrap();
+    let folder = place.path().join("files");
+    std::fs::create_dir(&folder).unwrap();
+    for month in 0..36 {
+        harness::granule::write(&folder, month, 0).unwrap();
+    }
+    let words = ["survey", folder.to_str().unwrap()];
+    let output = program::run(&place.path().join("data"), &words).unwrap();
+    let talk = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.success(), "{talk}");
+    for word in ["WARN", "cannot be read"] {
+        assert!(!talk.contains(word), "{talk}");
+    }
+}
+
+#[test]
 fn the_same_file_twice_lands_once() {
     let files = flux_files();
     let data = tempfile::tempdir().unwrap();

@@ -153,6 +153,41 @@ async fn what_a_step_held_that_was_dropped_goes_with_the_last_version_that_has_i
     assert_eq!(before - chunks().await, 3);
 }
 
+/// Whatever one of them has read of the cube's entry when the other goes by.
+#[tokio::test]
+async fn of_two_that_clean_up_at_once_each_takes_what_the_other_took_for_gone() {
+    let keep = Keep {
+        versions: 1,
+        age: Duration::ZERO,
+    };
+    for nth in 0..12 {
+        let inner = Store::memory();
+        let versions = three_versions(&inner).await;
+        let first = ObjectKey::manifest(&"p".parse().unwrap(), 1);
+        inner.remove(&first).await.unwrap();
+        let (other, reads) = (inner.clone(), AtomicUsize::new(0));
+        let (store, _removed) = watched(&inner, move |key| {
+            let is_turn = key == "cubes/p/repo" && reads.fetch_add(1, Ordering::Relaxed) == nth;
+            let other = other.clone();
+            async move {
+                if is_turn {
+                    let cleaned = clean_up::run(&other, keep, in_hours(2), false).await;
+                    cleaned.unwrap();
+                }
+                Ok(())
+            }
+            .boxed()
+        });
+        let cleaned = clean_up::run(&store, keep, in_hours(2), false).await;
+        let cleaned = cleaned.unwrap().remove(0);
+        assert_eq!(cleaned.refused, None, "read {nth}");
+        let repository = Repository::open(&inner, "cubes/p").await.unwrap();
+        assert_eq!(repository.versions().await.unwrap(), ["2", "3"]);
+        let steps = [(1, 10), (2, 2), (3, 3)];
+        holds(&inner, At::Newest, &versions[2], &steps).await;
+    }
+}
+
 /// As in a copy of a store, all of whose objects are young while the states of its cubes tell when they were made.
 #[tokio::test]
 async fn a_version_whose_manifest_stays_keeps_its_name_however_old_its_state_is() {

@@ -27,7 +27,10 @@ pub(crate) async fn run(options: &Survey) -> Result<()> {
         "there is nothing to survey: give folders of data files, or the files themselves"
     );
     let bar = progress::bar("survey", files.len() as u64);
-    let rows = ingest::survey(&files, &indexes, &settings).await?;
+    let rows = ingest::survey(&files, &indexes, &settings).await;
+    // Nobody reads what is thrown away along time, but broken off in the middle it would be told as damaged.
+    cube::compacted().await;
+    let rows = rows?;
     bar.set_position(files.len() as u64);
     progress::done(&bar, &format!("{} files", files.len()));
     progress::result(&ingest::markdown(&rows))?;

@@ -9,7 +9,7 @@ use async_trait::async_trait;
 use bytes::{Bytes, BytesMut};
 use cube::foreign::{ForeignError, Objects};
 use object_store::GetRange;
-use reqwest::header::CONTENT_LENGTH;
+use reqwest::header::{CONTENT_LENGTH, CONTENT_RANGE};
 use reqwest::{Method, Response, StatusCode};
 use retry::Backoff;
 use url::Url;
@@ -125,6 +125,55 @@ fn header(part: &GetRange) -> String {
     }
 }
 
+/// Is a part that came the one that was asked for? `said` is its `Content-Range`, `came_bytes` its length; what is asked for without a part
+/// is all from the first byte on.
+///
+/// # Errors
+/// What came in its place.
+fn check_part(said: Option<&str>, asked: Option<&GetRange>, came_bytes: u64) -> Result<(), String> {
+    let whole = GetRange::Offset(0);
+    let asked = asked.unwrap_or(&whole);
+    let said = said.unwrap_or("a part, and not which one");
+    // The end is the byte behind the last one.
+    let is_asked = span(said).is_some_and(|(start, end, total)| {
+        let is_to_end = total.is_none_or(|total| total == end);
+        let is_of_asked = match asked {
+            GetRange::Bounded(range) => {
+                start == range.start && (end == range.end || end < range.end && is_to_end)
+            }
+            GetRange::Offset(from) => start == *from && is_to_end,
+            GetRange::Suffix(length) => {
+                let from = total.unwrap_or(end).saturating_sub(*length);
+                start == from && is_to_end
+            }
+        };
+        is_of_asked && end - start == came_bytes
+    });
+    if is_asked {
+        return Ok(());
+    }
+    Err(format!(
+        "the server was asked for {} and answered {said} with {came_bytes} bytes: it, or a proxy before it, gives parts that are not those \
+         asked for; have it mended, or copy the store",
+        header(asked)
+    ))
+}
+
+/// The first byte, the one behind the last, and how many there are of the whole, where `bytes 5-8/100` or `bytes 5-8/*` is said.
+fn span(said: &str) -> Option<(u64, u64, Option<u64>)> {
+    let (unit, said) = said.trim().split_once(' ')?;
+    let (part, total) = said.trim().split_once('/')?;
+    let (first, last) = part.split_once('-')?;
+    let (start, last): (u64, u64) = (first.parse().ok()?, last.parse().ok()?);
+    let total = match total {
+        "*" => None,
+        total => Some(total.parse().ok()?),
+    };
+    let end = last.checked_add(1).filter(|end| *end > start)?;
+    unit.eq_ignore_ascii_case("bytes")
+        .then_some((start, end, total))
+}
+
 /// The content of an answer, which may say another length than it has.
 async fn content(
     mut answer: Response,
@@ -174,8 +223,15 @@ impl Objects for WebObjects {
         };
         let place = shown(&self.url(name));
         let is_part = answer.status() == StatusCode::PARTIAL_CONTENT;
+        let said = answer.headers().get(CONTENT_RANGE);
+        let said = said.and_then(|said| said.to_str().ok().map(str::to_owned));
         let content = content(answer, &place, most_bytes).await?;
-        let Some(part) = part.filter(|_| !is_part) else {
+        if is_part {
+            let checked = check_part(said.as_deref(), part.as_ref(), content.len() as u64);
+            checked.map_err(|reason| ForeignError::refused(place, reason))?;
+            return Ok(Some(content));
+        }
+        let Some(part) = part else {
             return Ok(Some(content));
         };
         // A server that knows no parts sends all.
@@ -209,5 +265,44 @@ mod tests {
         assert_eq!(header(&GetRange::Bounded(5..9)), "bytes=5-8");
         assert_eq!(header(&GetRange::Offset(7)), "bytes=7-");
         assert_eq!(header(&GetRange::Suffix(196)), "bytes=-196");
+    }
+
+    #[test]
+    fn a_part_that_is_not_the_one_asked_for_is_refused() {
+        let is_taken = |said: &str, asked: GetRange, came_bytes: u64| {
+            check_part(Some(said), Some(&asked), came_bytes).is_ok()
+        };
+        let (five, from, last) = (
+            || GetRange::Bounded(10..15),
+            || GetRange::Offset(90),
+            || GetRange::Suffix(4),
+        );
+        assert!(is_taken("bytes 10-14/100", five(), 5));
+        assert!(is_taken("Bytes 10-14/*", five(), 5));
+        // Of what ends earlier.
+        assert!(is_taken("bytes 10-12/13", five(), 3));
+        assert!(is_taken("bytes 90-99/100", from(), 10));
+        assert!(is_taken("bytes 96-99/100", last(), 4));
+        assert!(is_taken("bytes 0-2/3", last(), 3));
+        for (said, asked, came_bytes) in [
+            ("bytes 0-4/100", five(), 5),
+            ("bytes 10-12/100", five(), 3),
+            ("bytes 10-14/100", five(), 4),
+            ("bytes 10-19/100", five(), 10),
+            ("bytes 90-94/100", from(), 5),
+            ("bytes 0-3/100", last(), 4),
+            ("bytes 98-99/100", last(), 2),
+            ("bytes 14-10/100", five(), 5),
+            ("bytes */100", five(), 5),
+            ("items 10-14/100", five(), 5),
+            ("", five(), 5),
+        ] {
+            let refused = check_part(Some(said), Some(&asked), came_bytes).unwrap_err();
+            assert!(refused.contains(&header(&asked)), "{said}: {refused}");
+        }
+        assert!(check_part(None, Some(&five()), 5).is_err());
+        // The whole was asked for.
+        assert!(check_part(Some("bytes 0-9/10"), None, 10).is_ok());
+        assert!(check_part(Some("bytes 0-9/99"), None, 10).is_err());
     }
 }

@@ -24,6 +24,9 @@ pub(crate) type Indexes = BTreeMap<String, u64>;
 /// Attributes that hold stored numbers which stand for no data.
 const FILLS: [&str; 2] = ["_FillValue", "missing_value"];
 
+/// Attributes that say which stored numbers are values: what they hold that is no number is not as if they were not there.
+const LIMITS: [&str; 3] = ["valid_range", "valid_min", "valid_max"];
+
 /// Arrays that are read.
 #[derive(Clone)]
 pub(crate) struct Arrays {
@@ -225,8 +228,18 @@ fn variable(array: &ForeignArray, indexes: &Indexes) -> Variable {
 fn attributes(all: &Map<String, Value>, kind: Kind) -> Attributes {
     let kept = all.iter().filter(|(name, _)| name.len() <= MAX_NAME_BYTES);
     kept.take(MAX_ATTRIBUTES)
-        .filter_map(|(name, value)| Some((name.clone(), attribute(name, value, kind)?)))
+        .filter_map(|(name, value)| {
+            let read = attribute(name, value, kind).or_else(|| unread(name, value))?;
+            Some((name.clone(), read))
+        })
         .collect()
+}
+
+/// What stands for a fill value or a valid range and is neither numbers nor a text, as a text: whoever plans refuses it.
+fn unread(name: &str, value: &Value) -> Option<AttributeValue> {
+    let is_nothing = value.is_null() || value.as_array().is_some_and(Vec::is_empty);
+    let is_told = (FILLS.contains(&name) || LIMITS.contains(&name)) && !is_nothing;
+    is_told.then(|| AttributeValue::Text(cut(&value.to_string())))
 }
 
 fn attribute(name: &str, value: &Value, kind: Kind) -> Option<AttributeValue> {
@@ -320,6 +333,24 @@ mod tests {
         let numbers = of(json!(["-Infinity", "Infinity"]));
         assert!(matches!(numbers, Some(AttributeValue::Numbers { .. })));
         assert_eq!(of(json!([])), None);
+    }
+
+    #[test]
+    fn fill_values_and_valid_ranges_that_are_no_numbers_are_not_as_if_they_were_not_there() {
+        for value in [json!({"value": -999}), json!([1.5, "abc"])] {
+            for name in ["_FillValue", "missing_value", "valid_range", "valid_max"] {
+                let all = Map::from_iter([(name.to_owned(), value.clone())]);
+                let read = attributes(&all, Kind::Float(4));
+                let text = read.text(name).unwrap_or_default();
+                assert_eq!(text, value.to_string(), "{name}");
+            }
+            let other = Map::from_iter([("history".to_owned(), value)]);
+            assert_eq!(attributes(&other, Kind::Float(4)).text("history"), None);
+        }
+        for value in [Value::Null, json!([])] {
+            let all = Map::from_iter([("_FillValue".to_owned(), value)]);
+            assert!(attributes(&all, Kind::Float(4)).0.is_empty());
+        }
     }
 
     #[test]

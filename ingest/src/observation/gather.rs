@@ -12,6 +12,7 @@ use contract::observation::Observation;
 use super::convert::Conversion;
 use crate::check::MAX_IMPLAUSIBLE_SHARE;
 use crate::error::Rejection;
+use crate::figures::figures;
 
 /// Most observations of one file: about 300 MB.
 pub(crate) const MAX_OBSERVATIONS: usize = 1 << 20;
@@ -93,7 +94,10 @@ impl Gathered {
     /// Counts a value that cannot be true, in the stored unit.
     pub(super) fn implausible(&mut self, conversion: &Conversion, value: f64) {
         let tally = self.tally(&conversion.property);
-        tally.mask(|| format!("{value:e} {}{}", conversion.unit, conversion.bounds()));
+        tally.mask(|| {
+            let (value, bounds) = (figures(value), conversion.bounds());
+            format!("{value} {}{bounds}", conversion.unit)
+        });
     }
 
     /// Counts a value of digits that are no number.
@@ -212,8 +216,13 @@ impl Gathered {
                 continue;
             }
             let example = format!(
-                "two of {} on {} at {} m, {:e} and {:e} {}",
-                own.platform, own.time, own.depth_m, own.value, kept.value, own.unit
+                "two of {} on {} at {} m, {} and {} {}",
+                own.platform,
+                own.time,
+                own.depth_m,
+                figures(own.value),
+                figures(kept.value),
+                own.unit
             );
             let property = own.property.clone();
             let tally = self.tally(&property);
@@ -244,9 +253,13 @@ impl Gathered {
 /// What is wrong with two variables that say different things of one sample.
 fn contradiction((a, own): (&str, &Observation), (b, other): (&str, &Observation)) -> Rejection {
     let detail = format!(
-        "are both {} and differ at the same time, place and depth ({:e} and {:e} {} on {}); leave one of them out, or \
+        "are both {} and differ at the same time, place and depth ({} and {} {} on {}); leave one of them out, or \
          give it a standard name of its own",
-        own.property, own.value, other.value, own.unit, own.time
+        own.property,
+        figures(own.value),
+        figures(other.value),
+        own.unit,
+        own.time
     );
     Rejection::new(RejectReason::Corrupt, format!("{a} and {b}"), detail)
 }
@@ -344,7 +357,7 @@ mod tests {
         let refused = gathered.finish(why()).unwrap_err();
         assert_eq!(refused.reason, RejectReason::Values);
         assert_eq!(refused.object, "sea_surface_temperature");
-        for word in ["2 of 39", "4e2 K", "270", "325"] {
+        for word in ["2 of 39", "400 K", "270", "325"] {
             assert!(refused.detail.contains(word), "{refused}");
         }
     }

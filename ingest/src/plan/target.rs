@@ -244,9 +244,11 @@ pub(crate) fn packing(
 ) -> Result<Packing, Rejection> {
     let mut packing = Packing::of(variable);
     if let Some(rules) = profile.map(|p| &p.variable) {
-        let fills = rules.fill_values.iter().flatten();
-        let fills = fills.map(|fill| packing::as_stored(variable.kind, *fill));
-        packing.fills.extend(fills);
+        if let Some(fills) = &rules.fill_values {
+            let fills = fills.iter();
+            packing =
+                packing.with_fills(fills.map(|fill| packing::as_stored(variable.kind, *fill)));
+        }
         packing.scale = rules.scale_factor.unwrap_or(packing.scale);
         packing.offset = rules.add_offset.unwrap_or(packing.offset);
         if let Some([low, high]) = rules.valid_range {

@@ -430,7 +430,7 @@ fn object_store_path(key: &str) -> object_store::path::Path {
 /// What is done to a store, and what must be in the refusal.
 type Fault = (&'static str, fn(&Own), &'static [&'static str]);
 
-const FAULTS: [Fault; 15] = [
+const FAULTS: [Fault; 17] = [
     (
         "v2-plain.zarr",
         |own| {
@@ -490,6 +490,20 @@ const FAULTS: [Fault; 15] = [
             "the fill value 300 (fill_value of .zarray)",
             "_FillValue of its attributes, or a profile, names another",
         ],
+    ),
+    (
+        "v2-plain.zarr",
+        |own| own.edit("sst/.zattrs", |it| it["_FillValue"] = json!("abc")),
+        &["sst", "has _FillValue \"abc\"", "correct the fill value"],
+    ),
+    (
+        "v3-gzip.zarr",
+        |own| {
+            own.edit("sst/zarr.json", |it| {
+                it["attributes"]["valid_range"] = json!({"low": 0});
+            });
+        },
+        &["sst", "has valid_range", "correct the valid range"],
     ),
     (
         "v2-plain.zarr",

@@ -117,6 +117,10 @@ async fn what_a_server_answers_wrong_is_refused() {
                 Answer::Whole("302 Found", vec![location], vec![])
             }
             ("half", Some(content)) if is_chunk => Answer::Half(content),
+            ("other", Some(content)) if is_chunk => {
+                let part = vec!["content-range: bytes 1-10/99999".to_owned()];
+                Answer::Whole("206 Partial Content", part, content[..10].to_vec())
+            }
             // One that was never written would be no data here.
             ("gone", Some(_)) if is_chunk => Answer::Whole("410 Gone", vec![], vec![]),
             // Nothing says beforehand how long it is.
@@ -146,6 +150,7 @@ async fn what_a_server_answers_wrong_is_refused() {
         ("huge", "17825792 bytes, at most 16777216 are read"),
         ("endless", "at most 16777216 are read"),
         ("half", "sst/c/0/0/0"),
+        ("other", "answered bytes 1-10/99999 with 10 bytes"),
         ("gone", "410 Gone: it was there and was taken away"),
     ] {
         let address = format!("http://{}/{way}", server.address);

@@ -1,11 +1,16 @@
 //! Answers of clouds in; those that refuse come out with their code and their sentence alone. Whole, they may repeat what a request
-//! was signed with, a session's token among it, and errors are shown and logged.
+//! was signed with, a session's token among it, and errors are shown and logged. A store that does not answer is told of at once: the
+//! library tries again for long, and says nothing of it.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
 use async_trait::async_trait;
 use futures::TryStreamExt as _;
 use object_store::ClientOptions;
 use object_store::client::{
-    HttpClient, HttpConnector, HttpError, HttpRequest, HttpResponse, HttpService, ReqwestConnector,
+    HttpClient, HttpConnector, HttpError, HttpErrorKind, HttpRequest, HttpResponse, HttpService,
+    ReqwestConnector,
 };
 
 use crate::refusal::element;
@@ -19,22 +24,61 @@ const TOLD: [&str; 3] = ["Code", "Message", "Region"];
 
 /// Makes clients of the kind that the library makes by itself.
 #[derive(Debug)]
-pub(super) struct Connector;
+pub(super) struct Connector {
+    /// How long requests are tried again.
+    pub(super) retries: Duration,
+}
 
 impl HttpConnector for Connector {
     fn connect(&self, options: &ClientOptions) -> object_store::Result<HttpClient> {
         let inner = ReqwestConnector::default().connect(options)?;
-        Ok(HttpClient::new(Service(inner)))
+        Ok(HttpClient::new(Service {
+            inner,
+            retries: self.retries,
+            is_away: AtomicBool::new(false),
+        }))
     }
 }
 
 #[derive(Debug)]
-struct Service(HttpClient);
+struct Service {
+    inner: HttpClient,
+    retries: Duration,
+    /// Has it not answered since it last did?
+    is_away: AtomicBool,
+}
+
+impl Service {
+    /// Says once that a host does not answer, until it does again: whoever waits for a command is to see why.
+    fn tell(&self, host: &str, error: &HttpError) {
+        let is_silence = matches!(
+            error.kind(),
+            HttpErrorKind::Connect | HttpErrorKind::Timeout
+        );
+        if is_silence && !self.is_away.swap(true, Ordering::Relaxed) {
+            let retries_s = self.retries.as_secs_f64();
+            let why = innermost(error);
+            tracing::warn!("{host} does not answer ({why}): tried again for at most {retries_s} s");
+        }
+    }
+}
+
+/// What an error is for in the end; what is around it tells of the request.
+fn innermost(error: &HttpError) -> String {
+    let mut innermost: &dyn std::error::Error = error;
+    while let Some(source) = innermost.source() {
+        innermost = source;
+    }
+    innermost.to_string()
+}
 
 #[async_trait]
 impl HttpService for Service {
     async fn call(&self, request: HttpRequest) -> Result<HttpResponse, HttpError> {
-        let answer = self.0.execute(request).await?;
+        let host = request.uri().host().unwrap_or_default().to_owned();
+        let answer = self.inner.execute(request).await;
+        let answer = answer.inspect_err(|error| self.tell(&host, error))?;
+        self.is_away.store(false, Ordering::Relaxed);
         let status = answer.status();
         if status.is_success() || status.is_informational() {
             return Ok(answer);

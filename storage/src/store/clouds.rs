@@ -78,7 +78,7 @@ fn s3(bucket: &str, settings: &Settings) -> Result<Arc<dyn ObjectStore>, String>
         // Objects are created once: a store that cannot promise that is found out by `check_writable`.
         .with_config(Key::ConditionalPut, "etag")
         .with_skip_signature(is_unsigned)
-        .with_http_connector(Connector)
+        .with_http_connector(connector(settings))
         .with_retry(retries(settings.retry_limits))
         .build();
     Ok(Arc::new(store.map_err(|e| e.to_string())?))
@@ -118,7 +118,7 @@ fn google(bucket: &str, settings: &Settings) -> Result<Arc<dyn ObjectStore>, Str
     let store = builder
         .with_bucket_name(bucket)
         .with_skip_signature(is_unsigned)
-        .with_http_connector(Connector)
+        .with_http_connector(connector(settings))
         .with_retry(retries(settings.retry_limits))
         .build();
     Ok(Arc::new(store.map_err(|e| e.to_string())?))
@@ -166,7 +166,7 @@ fn azure(container: &str, settings: &Settings) -> Result<Arc<dyn ObjectStore>, S
     let store = builder
         .with_container_name(container)
         .with_skip_signature(is_unsigned && !is_emulator)
-        .with_http_connector(Connector)
+        .with_http_connector(connector(settings))
         .with_retry(retries(settings.retry_limits))
         .build();
     Ok(Arc::new(store.map_err(|e| e.to_string())?))
@@ -213,6 +213,12 @@ fn client_options(retry_limits: RetryLimits, is_plain: bool) -> [(ClientConfigKe
     ]
 }
 
+fn connector(settings: &Settings) -> Connector {
+    Connector {
+        retries: settings.retry_limits.retries,
+    }
+}
+
 fn retries(retry_limits: RetryLimits) -> RetryConfig {
     let backoff = retry_limits.backoff();
     RetryConfig {
@@ -237,6 +243,7 @@ mod tests {
     use object_store::path::Path;
 
     use super::*;
+    use crate::store::warnings::Warnings;
 
     const SECRET: &str = "c2VjcmV0LXZhbHVl";
 
@@ -314,6 +321,30 @@ mod tests {
             .try_recv()
             .ok()
             .map(|head: String| head.to_lowercase())
+    }
+
+    #[tokio::test]
+    async fn a_store_that_does_not_answer_is_told_of_once_and_at_once() {
+        let (warned, _guard) = Warnings::kept();
+        // Nobody listens there any more.
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let endpoint = format!("http://{}", listener.local_addr().unwrap());
+        drop(listener);
+        let variables = [
+            ("AWS_ENDPOINT_URL", endpoint.as_str()),
+            ("AWS_ALLOW_HTTP", "true"),
+        ];
+        let mut settings = settings(&variables).as_anybody();
+        settings.retry_limits.retries = Duration::from_millis(600);
+        let store = open(Cloud::S3, "bucket", &settings).unwrap();
+        assert!(store.get(&Path::from("key")).await.is_err());
+        let lines = warned.lines();
+        let [line] = &lines[..] else {
+            panic!("{lines:?}");
+        };
+        for part in ["127.0.0.1 does not answer", "at most 0.6 s"] {
+            assert!(line.contains(part), "{line}");
+        }
     }
 
     #[tokio::test]

@@ -16,6 +16,8 @@ const DEFAULT_FILL_FLOAT: f64 = 1e34;
 const ANY: Range = (f64::NEG_INFINITY, f64::INFINITY);
 /// The attributes that make values of stored numbers.
 const SCALES: [&str; 2] = ["scale_factor", "add_offset"];
+/// The attributes that say which stored numbers mean no data.
+const FILLS: [&str; 2] = ["_FillValue", "missing_value"];
 
 /// Lowest and highest number that is valid.
 type Range = (f64, f64);
@@ -36,6 +38,8 @@ pub(crate) struct Packing {
     is_float32: bool,
     /// The text of a valid range that is none, with its name; [`Packing::checked`] refuses it: values would be taken that are none.
     unread: Option<String>,
+    /// The same of a fill value: what means no data would be taken for values.
+    unread_fill: Option<String>,
     /// What was taken for granted, if the file leaves it open.
     pub(crate) assumption: Option<String>,
 }
@@ -80,6 +84,7 @@ impl From<&StoredPacking> for Packing {
             unsigned_wrap: stored.unsigned_wrap.map(NumberBits::number),
             is_float32: stored.is_float32,
             unread: None,
+            unread_fill: None,
             assumption: None,
         }
     }
@@ -109,7 +114,7 @@ impl Packing {
     /// The packing that the attributes of a variable state.
     pub(crate) fn of(variable: &Variable) -> Self {
         let attributes = &variable.attributes;
-        let mut fills: Vec<f64> = ["_FillValue", "missing_value"]
+        let mut fills: Vec<f64> = FILLS
             .into_iter()
             .filter_map(|name| numbers(variable, name))
             .flatten()
@@ -135,6 +140,7 @@ impl Packing {
             unsigned_wrap,
             is_float32: variable.kind == Kind::Float(4),
             unread: None,
+            unread_fill: FILLS.into_iter().find_map(|name| unread(variable, name)),
             assumption: None,
         };
         let pair = packing.numbers_of_range(variable, "valid_range", 2);
@@ -156,7 +162,7 @@ impl Packing {
     /// This, if values can be had by it.
     ///
     /// # Errors
-    /// `Values` if the scale is zero, scale or offset are no finite number, or the valid range is a text that is none.
+    /// `Values` if the scale is zero, scale or offset are no finite number, or the valid range or a fill value is a text that is none.
     pub(crate) fn checked(self, variable: &Variable) -> Result<Self, Rejection> {
         let (scale, offset) = (self.scale, self.offset);
         let refused = |what: &str, own: &str| {
@@ -172,13 +178,24 @@ impl Packing {
         if let Some(unread) = &self.unread {
             return refused(unread, "the valid range");
         }
+        if let Some(unread) = &self.unread_fill {
+            return refused(unread, "the fill value");
+        }
         Ok(self)
     }
 
-    /// The same where a valid range that is a text and none counts for nothing: of places, times, bounds and flags, which no such range
-    /// leaves out.
+    /// The same where a valid range or a fill value that is a text and none counts for nothing: of places, times, bounds and flags, which no
+    /// such range leaves out.
     pub(crate) fn with_any_range_text(mut self) -> Self {
         self.unread = None;
+        self.unread_fill = None;
+        self
+    }
+
+    /// These stored numbers mean no data too, and say what a fill value of the file does not that is none.
+    pub(crate) fn with_fills(mut self, fills: impl IntoIterator<Item = f64>) -> Self {
+        self.fills.extend(fills);
+        self.unread_fill = None;
         self
     }
 
@@ -297,6 +314,13 @@ fn numbers(variable: &Variable, name: &str) -> Option<Vec<f64>> {
     let own = variable.attributes.numbers(name);
     // The fill value of text is a letter.
     own.or_else(|| variable.is_numeric().then(of_text).flatten())
+}
+
+/// The text of an attribute that is to hold numbers, with its name, where it does not; an empty one says nothing.
+fn unread(variable: &Variable, name: &str) -> Option<String> {
+    let text = variable.attributes.text(name).unwrap_or_default();
+    let is_unread = !text.is_empty() && variable.is_numeric() && numbers(variable, name).is_none();
+    is_unread.then(|| format!("{name} {text:?}"))
 }
 
 /// The number of an attribute, `usual` if it is not there. Of text that is not one number NaN, which [`Packing::checked`] refuses: values

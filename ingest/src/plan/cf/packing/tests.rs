@@ -142,6 +142,36 @@ fn a_valid_range_that_is_written_as_text_counts_and_what_is_no_numbers_is_refuse
     );
 }
 
+#[test]
+fn a_fill_value_that_is_no_number_is_refused_unless_a_profile_says_another() {
+    let with = |mut own: Variable, name: &str, text: &str| {
+        let text = AttributeValue::Text(text.to_owned());
+        own.attributes.0.insert(name.to_owned(), text);
+        own
+    };
+    for name in ["_FillValue", "missing_value"] {
+        for text in ["abc", "-999,0", "{\"value\":-999}"] {
+            let own = with(variable(FLOAT, &[]), name, text);
+            let refused = Packing::of(&own).checked(&own).unwrap_err();
+            for part in [name, "the fill value"] {
+                assert!(refused.detail.contains(part), "{refused}");
+            }
+            let packing = Packing::of(&own).with_fills([-999.0]);
+            assert!(packing.value(-999.0).is_nan());
+            assert!(packing.checked(&own).is_ok(), "a profile says it");
+            let of_axes = Packing::of(&own).with_any_range_text();
+            assert!(of_axes.checked(&own).is_ok(), "{text}");
+        }
+        for text in ["-999", "-999, -998", "NaN", ""] {
+            let own = with(variable(FLOAT, &[]), name, text);
+            assert!(Packing::of(&own).checked(&own).is_ok(), "{text}");
+        }
+        // The fill value of text is a letter.
+        let letters = with(variable(Kind::Other, &[]), name, "x");
+        assert!(Packing::of(&letters).checked(&letters).is_ok());
+    }
+}
+
 /// Halves are 8 apart there: -9999 is stored as -10000.
 #[test]
 fn a_fill_value_of_more_digits_than_values_have_is_the_nearest_of_theirs() {
