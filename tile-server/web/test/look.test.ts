@@ -6,9 +6,11 @@ import { isSameLayer, layerKey, type LayerSpec } from "../src/globe/layer";
 import { changeOf, colourParameters, parameters, parseRange, viewParameters } from "../src/look/address";
 import { effective, type Look, possible, USUAL, withoutColours } from "../src/look/look";
 import { offerOf } from "../src/look/offer";
+import { RangeForm } from "../src/look/range-form";
 import { Catalogue } from "../src/state/catalogue";
 import { decodeHash, encodeHash } from "../src/state/hash";
 import { INITIAL, type State } from "../src/state/store";
+import { paperDocument, type PaperElement } from "./paper-page";
 
 beforeEach(() => vi.stubGlobal("document", { baseURI: "http://host/below/" }));
 afterEach(() => vi.unstubAllGlobals());
@@ -205,6 +207,37 @@ describe("the look panel", () => {
   it("offers the product's own range, also while another one is chosen", () => {
     const look = { ...USUAL, range: { low: 1, high: 2 } };
     expect(offer({ look })).toMatchObject({ range: { low: -40, high: 40 }, unit: "g C m⁻² yr⁻¹" });
+  });
+
+  it("offers a logarithmic scale where the range that is shown lies above 0, and says why not elsewhere", () => {
+    const problem = (change: Partial<State>) => offer(change)?.logProblem;
+    const within = (low: number, high: number) => ({ look: { ...USUAL, range: { low, high } } });
+    expect(problem({})).toBe("A logarithmic scale needs a range above 0; this one begins at −40.0.");
+    expect(problem(within(0, 40))).toMatch(/begins at 0\.0\.$/);
+    expect(problem(within(0.1, 40))).toBe("");
+    // The zero of degrees is another one than that of what is stored.
+    const legend = { low: 2, high: 30, unit: "°C", label: "", stops: [], ticks: [] };
+    const warm = new Catalogue([product("sst", { display_offset: -273.15, legend })]);
+    expect(offerOf(warm, [], state({ product: "sst" }))?.logProblem).toMatch(/zero of °C/);
+  });
+
+  it("takes no range that begins below 0 on a logarithmic scale", () => {
+    vi.stubGlobal("document", paperDocument());
+    const taken: unknown[] = [];
+    const form = new RangeForm((range) => taken.push(range));
+    const page = form.element as unknown as PaperElement;
+    const type = (low: string): string | null | undefined => {
+      const input = page.find("range-low");
+      if (input) input.value = low;
+      input?.tell("change");
+      return page.find("range-problem")?.textContent;
+    };
+    form.show(null, { low: 0.1, high: 10 }, "mg m-3", true);
+    expect(type("-1")).toMatch(/above 0/);
+    expect(type("1")).toBe("");
+    form.show(null, { low: 0.1, high: 10 }, "mg m-3", false);
+    expect(type("-1")).toBe("");
+    expect(taken).toEqual([{ low: 1, high: 10 }, { low: -1, high: 10 }]);
   });
 
   it("offers elevations that have landed as reliefs", () => {

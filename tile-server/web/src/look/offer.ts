@@ -1,6 +1,6 @@
 //! What the look panel can offer: catalogue, palettes and state in, the choices that make sense now out.
 import type { Palette } from "../api/types";
-import { titleText } from "../page/format";
+import { alikeText, titleText, unitText } from "../page/format";
 import type { Catalogue } from "../state/catalogue";
 import type { State } from "../state/store";
 import { canUncertainty, hasHeight, hasIsolines, hasSea, type Range } from "./look";
@@ -16,6 +16,10 @@ export interface LookOffer {
   /** The product's own, in the unit that people read. */
   range: Range;
   unit: string;
+  /** Why a logarithmic scale cannot be had; empty where it can. */
+  logProblem: string;
+  /** The layer is drawn on one now, chosen or by itself. */
+  isLog: boolean;
   reliefs: { id: string; title: string }[];
   canUncertainty: boolean;
   hasIsolines: boolean;
@@ -33,14 +37,19 @@ export function offerOf(
   const legend = catalogue.usualLegend(product, mode);
   if (product === null || !legend) return undefined;
   const isLifted = catalogue.isLifted(product);
+  const range = { low: legend.low, high: legend.high };
+  // Speeds of a flow have the same unit as its parts, and no other zero.
+  const offset = mode === "flow" ? 0 : (catalogue.find(product)?.display_offset ?? 0);
   const choice = (palette: Palette): PaletteChoice => {
     const isUsual = JSON.stringify(palette.stops) === JSON.stringify(legend.stops);
     return { ...palette, isUsual, title: capitalised(palette.name) + (isUsual ? " (default)" : "") };
   };
   return {
     palettes: palettes.map(choice),
-    range: { low: legend.low, high: legend.high },
+    range,
     unit: legend.unit,
+    logProblem: logProblem(look.range ?? range, legend.unit, offset),
+    isLog: (look.scale ?? legend.scale) === "log",
     reliefs: catalogue.reliefs.map((each) => ({ id: each.product, title: titleText(each) })),
     canUncertainty: canUncertainty(mode),
     hasIsolines: hasIsolines(mode),
@@ -48,6 +57,14 @@ export function offerOf(
     hasSea: hasSea(look, mode, isLifted),
     hasHeight: hasHeight(mode, isLifted),
   };
+}
+
+/** A logarithm has no place for 0 or less, and none for a zero that was agreed upon, as that of °C. */
+function logProblem({ low, high }: Range, unit: string, offset: number): string {
+  if (offset !== 0) return `No logarithmic scale: the zero of ${unitText(unit)} was agreed upon.`;
+  if (low > 0) return "";
+  const shown = alikeText(low, Math.max(Math.abs(low), Math.abs(high)), 3);
+  return `A logarithmic scale needs a range above 0; this one begins at ${shown}.`;
 }
 
 function capitalised(name: string): string {

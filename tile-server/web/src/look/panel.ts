@@ -2,7 +2,7 @@
 import { el } from "../page/dom";
 import { toggle } from "../page/toggle";
 import type { Store } from "../state/store";
-import { type Look, type Scale, USUAL } from "./look";
+import { type Look, type Range, type Scale, USUAL } from "./look";
 import type { LookOffer } from "./offer";
 import { PaletteList } from "./palette-list";
 import { RangeForm } from "./range-form";
@@ -13,13 +13,15 @@ export class LookPanel {
   readonly #offer: () => LookOffer | undefined;
   readonly #palettes = new PaletteList((palette) => this.#change({ palette }));
   readonly #reversed = toggle("reversed", "Reversed", (reversed) => this.#change({ reversed }));
-  readonly #range = new RangeForm((range) => this.#change({ range }));
+  readonly #range = new RangeForm((range) => this.#setRange(range));
+  readonly #log = el("option", { value: "log" }, "Logarithmic");
+  readonly #scaleHint = el("p", { class: "muted", id: "scale-hint", hidden: true });
   readonly #scale = el(
     "select",
-    { id: "scale" },
+    { id: "scale", "aria-describedby": "scale-hint" },
     el("option", { value: "" }, "As usual"),
     el("option", { value: "linear" }, "Linear"),
-    el("option", { value: "log" }, "Logarithmic"),
+    this.#log,
   );
   readonly #uncertainty = toggle("uncertainty", "Mark cells that were filled", (uncertainty) => this.#change({ uncertainty }));
   readonly #surroundings: SurroundingsForm;
@@ -38,6 +40,7 @@ export class LookPanel {
         this.#reversed.element,
         this.#range.element,
         el("label", { class: "field" }, el("span", {}, "Scale"), this.#scale),
+        this.#scaleHint,
         this.#uncertainty.element,
       ),
       this.#surroundings.element,
@@ -53,11 +56,20 @@ export class LookPanel {
     const { look } = this.#store.state;
     this.#palettes.show(offer.palettes, look.palette, look.reversed);
     this.#reversed.show(look.reversed);
-    this.#range.show(look.range, offer.range, offer.unit);
+    this.#range.show(look.range, offer.range, offer.unit, offer.isLog);
+    this.#log.disabled = offer.logProblem !== "";
+    this.#scaleHint.textContent = offer.logProblem;
+    this.#scaleHint.hidden = offer.logProblem === "";
     this.#scale.value = look.scale ?? "";
     this.#uncertainty.show(look.uncertainty);
     this.#uncertainty.element.hidden = !offer.canUncertainty;
     this.#surroundings.show(look, offer);
+  }
+
+  /** The product's own range may begin below 0: a logarithmic scale that was chosen for another one goes with it. */
+  #setRange(range: Range | null): void {
+    const isLost = range === null && this.#store.state.look.scale === "log" && !((this.#offer()?.range.low ?? 0) > 0);
+    this.#change(isLost ? { range, scale: null } : { range });
   }
 
   #reset(): void {

@@ -12,6 +12,7 @@ export class RangeForm {
   readonly #title = el("span");
   readonly #problem = el("p", { class: "problem", id: "range-problem", role: "alert", hidden: true });
   #usual: Range = { low: 0, high: 1 };
+  #isLog = false;
   #shown = "";
 
   constructor(onChange: (range: Range | null) => void) {
@@ -27,9 +28,10 @@ export class RangeForm {
     for (const input of [this.#low, this.#high]) input.addEventListener("change", () => this.#typed());
   }
 
-  /** What somebody is about to type stays until the range itself is another one. */
-  show(range: Range | null, usual: Range, unit: string): void {
+  /** What somebody is about to type stays until the range itself is another one. `isLog`: it has to lie above 0. */
+  show(range: Range | null, usual: Range, unit: string, isLog: boolean): void {
     this.#usual = usual;
+    this.#isLog = isLog;
     this.#title.textContent = unit === "" ? "Range" : `Range, ${unitText(unit)}`;
     this.#fill(range ?? usual);
   }
@@ -47,7 +49,9 @@ export class RangeForm {
   }
 
   #typed(): void {
-    const range = parseRange(this.#low.value, this.#high.value);
+    const typed = parseRange(this.#low.value, this.#high.value);
+    const isBelow = typeof typed !== "string" && this.#isLog && typed.low <= 0;
+    const range = isBelow ? "A range on a logarithmic scale lies above 0." : typed;
     this.#say(typeof range === "string" ? range : "");
     if (typeof range === "string") return;
     const { low, high } = range;
