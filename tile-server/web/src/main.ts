@@ -104,6 +104,7 @@ const controls = new Controls(byId("controls"), store, () => view.open());
 const legend = new LegendCard(
   controls.legend,
   (id, mode, manifest) => inventory.catalogue.usualLegend(id, mode, manifest),
+  (id) => inventory.catalogue.codesOf(id),
   report,
 );
 const timeline = new Timeline(byId("timeline"), store, isFollowed);

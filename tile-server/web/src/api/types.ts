@@ -14,6 +14,8 @@ export type PointSeries = Extract<Answer<"point">, { series: unknown }>;
 /** What a sum holds, at a place. */
 export type CellCounts = Schemas["CellCounts"];
 export type Quantity = Schemas["Quantity"];
+/** A code of a mask and what it means. */
+export type Flag = Schemas["Flag"];
 export type Cells = Schemas["Cells"];
 export type Earth = Schemas["Earth"];
 export type Budget = Schemas["BudgetAnswer"];

@@ -1,8 +1,9 @@
-//! The legend of what is in sight: a layer in, its colour bar out. Colours that somebody chose are described by the server.
+//! The legend of what is in sight: a layer in, its colour bar out, or the colours of its codes. Colours that somebody chose are described by the server.
 import { queryOf } from "../api/pictures";
 import * as api from "../api/requests";
-import type { Legend, Mode } from "../api/types";
+import type { Flag, Legend, Mode } from "../api/types";
 import { colourParameters } from "./address";
+import { codesView } from "./codes";
 import { legendView } from "./legend";
 import type { Look } from "./look";
 
@@ -21,17 +22,22 @@ const MOST_KNOWN = 50;
 /** The legend of a version in its own colours, where it is known without asking. */
 type Usual = (product: string, mode: Mode, manifest: string) => Legend | undefined;
 
+/** What a product's values mean where they are codes; empty where they are none. */
+type Codes = (product: string) => readonly Flag[];
+
 export class LegendCard {
   readonly #slot: HTMLElement;
   readonly #usual: Usual;
+  readonly #codes: Codes;
   readonly #onError: (key: string, error: unknown) => void;
   readonly #known = new Map<string, Promise<Legend>>();
   #wanted = "";
   #shown = "";
 
-  constructor(slot: HTMLElement, usual: Usual, onError: (key: string, error: unknown) => void) {
+  constructor(slot: HTMLElement, usual: Usual, codes: Codes, onError: (key: string, error: unknown) => void) {
     this.#slot = slot;
     this.#usual = usual;
+    this.#codes = codes;
     this.#onError = onError;
   }
 
@@ -49,7 +55,8 @@ export class LegendCard {
       const legend = await this.#legendOf(layer);
       if (this.#wanted !== wanted || this.#shown === wanted) return;
       this.#shown = wanted;
-      this.#slot.replaceChildren(legendView(legend));
+      const codes = layer.mode === "flow" ? [] : this.#codes(layer.product);
+      this.#slot.replaceChildren(codes.length > 0 ? codesView(legend, codes) : legendView(legend));
     } catch (error) {
       this.#onError("legend", error);
     }

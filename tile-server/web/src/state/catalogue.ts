@@ -1,5 +1,5 @@
 //! The products as the page uses them: steps parsed, and the layer that a state describes.
-import type { Legend, Mode, News, Product, Quantity } from "../api/types";
+import type { Flag, Legend, Mode, News, Product, Quantity } from "../api/types";
 import type { LayerSpec } from "../globe/layer";
 import { effective, type Look } from "../look/look";
 import { titleText } from "../page/format";
@@ -21,10 +21,15 @@ export function holdsAt(quantity: Quantity): HoldsAt {
 /** Units of angles, lower case: those of directions. */
 const ANGLES = /^(°|(arc_)?degrees?|degrees?_?(true|t)|radians?|rad|deg)$/;
 
+/** What values mean where they are codes, in the order of values. */
+export function codesOf(quantity: Quantity): readonly Flag[] {
+  return typeof quantity === "string" ? [] : (quantity.flags ?? []);
+}
+
 /** Is there something between two of its values? Not of codes, and not of directions; pictures have those of one step. */
 export function isLinear(quantity: Quantity): boolean {
   if (typeof quantity === "string") return true;
-  return !quantity.flags?.length && !ANGLES.test(quantity.unit.toLowerCase());
+  return codesOf(quantity).length === 0 && !ANGLES.test(quantity.unit.toLowerCase());
 }
 
 export class Catalogue {
@@ -99,6 +104,12 @@ export class Catalogue {
     const product = this.find(id);
     if (manifest !== undefined && product?.manifest !== manifest) return undefined;
     return (mode === "flow" ? product?.flow_legend : undefined) ?? product?.legend;
+  }
+
+  /** What a product's values mean where they are codes. */
+  codesOf(id: string): readonly Flag[] {
+    const product = this.find(id);
+    return product ? codesOf(product.quantity) : [];
   }
 
   /** What is drawn of the chosen look in a mode. */
