@@ -46,6 +46,37 @@ export async function landHasNoData(journey) {
   await page.locator("#series-plot").waitFor({ state: "detached" });
 }
 
+/** The far side is turned to, and what is in sight already stays where it is. */
+export async function typedPlaceIsTurnedTo(journey) {
+  const { page } = journey;
+  const camera = async () => (await journey.state()).camera;
+  const type = async ({ lon, lat }) => {
+    await page.locator("#tab-place").click();
+    await page.locator("#place-lat").fill(String(lat));
+    await page.locator("#place-lon").fill(String(lon));
+    await page.locator("#place-lon").press("Enter");
+  };
+  const start = await camera();
+  await type(SEA);
+  await page.locator("#series-plot").waitFor();
+  assert.deepEqual(await camera(), start, "what is in sight is not turned to");
+  const far = { lon: wrapped(start.lon + 170), lat: 12 };
+  assert.equal(await page.evaluate(({ lon, lat }) => window.fluxglobe.project(lon, lat), far), undefined);
+  await type(far);
+  await journey.until(({ lon, lat }) => {
+    const { camera } = window.fluxglobe.state;
+    return Math.abs(camera.lon - lon) < 0.5 && Math.abs(camera.lat - lat) < 0.5;
+  }, far);
+  assert.ok(await page.evaluate(({ lon, lat }) => window.fluxglobe.project(lon, lat), far));
+  await page.locator('[aria-label="Back to the start"]').click();
+  await journey.until((lon) => Math.abs(window.fluxglobe.state.camera.lon - lon) < 0.5, start.lon);
+}
+
+/** A longitude from -180 to 180. */
+function wrapped(lon) {
+  return ((lon + 540) % 360) - 180;
+}
+
 export async function budgetTotal(journey) {
   const { page } = journey;
   await page.locator("#tab-budget").click();

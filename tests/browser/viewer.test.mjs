@@ -1,7 +1,7 @@
 //! The viewer in a real browser against a running server: FLUXGLOBE_URL in, checks and (with FLUXGLOBE_SCREENSHOTS) pictures out.
 import assert from "node:assert/strict";
 import test from "node:test";
-import { budgetTotal, checkTable, landHasNoData, seriesOfSea } from "./analysis-steps.mjs";
+import { budgetTotal, checkTable, landHasNoData, seriesOfSea, typedPlaceIsTurnedTo } from "./analysis-steps.mjs";
 import { keepsTiles } from "./cache-steps.mjs";
 import { filmIsRefused, filmIsSaved, largePictureIsCancelled } from "./film-steps.mjs";
 import {
@@ -72,6 +72,7 @@ test("the viewer", async (t) => {
     await step("plays and pauses", plays);
     await step("plots the series of a place in the sea that is clicked", seriesOfSea);
     await step("says of a typed place on land that there is no data", landHasNoData);
+    await step("turns the globe to a typed place that is out of sight", typedPlaceIsTurnedTo);
     await step("shows the server's own budget total", budgetTotal);
     await step("shows the check table", checkTable);
     await step("plots what a platform that is clicked measured", observationsOfPlatform);

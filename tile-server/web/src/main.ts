@@ -115,6 +115,7 @@ const placePanel = new PlacePanel(panels.bodies.place, {
   steps: () => inventory.steps,
   label: () => inventory.product?.legend.label ?? "",
   bounds: () => inventory.product?.bounds_deg,
+  bringIntoSight: (place) => globe.bringIntoSight(place),
   onError: report,
 });
 const budgetPanel = new BudgetPanel(panels.bodies.budget, {

@@ -16,6 +16,7 @@ import {
   buildModuleUrl,
   type Scene,
 } from "cesium";
+import { wrapLon } from "../page/format";
 import { type CameraView, HOME, OPENING_DEG, type Place, SPHERE_RADIUS_M } from "../state/camera";
 import type { Bounds } from "./box";
 
@@ -150,6 +151,15 @@ export class Globe {
     // A box of 40 degrees fills the window from about 4800 km; nearer or further in proportion.
     const heightKm = Math.min(HOME.heightKm, Math.max(800, span * 120));
     this.fly({ lon, lat: (south + north) / 2, heightKm, headingDeg: 0, pitchDeg: -90, rollDeg: 0 }, 1.2);
+  }
+
+  /** Flies over a place that is out of sight: on the far side, beyond the window's edge, or below a card. */
+  bringIntoSight(place: Place): void {
+    const point = this.project(place);
+    const { left, top } = this.canvas.getBoundingClientRect();
+    if (point && document.elementFromPoint(left + point.x, top + point.y) === this.canvas) return;
+    const { heightKm } = this.view;
+    this.fly({ lon: wrapLon(place.lon), lat: place.lat, heightKm, headingDeg: 0, pitchDeg: -90, rollDeg: 0 }, 1.2);
   }
 
   #dress(options: GlobeOptions): void {

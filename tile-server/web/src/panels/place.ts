@@ -20,6 +20,8 @@ export interface PlaceContext {
   steps: () => readonly Step[];
   label: () => string;
   bounds: () => Bounds | undefined;
+  /** Somebody typed a place, which may lie on the far side. */
+  bringIntoSight: (place: Place) => void;
   onError: (key: string, error: unknown) => void;
 }
 
@@ -52,8 +54,10 @@ export class PlacePanel {
     );
     form.addEventListener("submit", (event) => {
       event.preventDefault();
-      if (this.#lat.value !== "" && this.#lon.value !== "")
-        context.store.set({ place: { lon: Number(this.#lon.value), lat: Number(this.#lat.value) } });
+      if (this.#lat.value === "" || this.#lon.value === "") return;
+      const place = { lon: Number(this.#lon.value), lat: Number(this.#lat.value) };
+      context.store.set({ place });
+      context.bringIntoSight(place);
     });
     body.append(form, this.#content);
     context.store.on(["place", "product"], () => void this.refresh());
