@@ -138,6 +138,7 @@ new Playback(
   () => inventory.steps,
   (timeMs) => inventory.layerAt(timeMs),
   live,
+  (timeMs) => controls.waitFor(timeMs),
 );
 new LiveSwitch(controls.live, store, live);
 new Readout(byId("app"), { rate: live.rate, picture: () => live.picture, tiles: () => stage.load });

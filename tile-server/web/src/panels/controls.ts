@@ -7,6 +7,7 @@ import { el, icon } from "../page/dom";
 import { chemistry, titleTexts } from "../page/format";
 import { PICTURE } from "../page/icons";
 import type { Store } from "../state/store";
+import { dayText } from "../time/steps";
 
 const MODE_TITLES: Record<Mode, string> = { map: "Map", points: "Points", sprites: "Sprites", volume: "Volume", flow: "Flow" };
 const MODE_HINTS: Record<Mode, string> = {
@@ -16,6 +17,12 @@ const MODE_HINTS: Record<Mode, string> = {
   volume: "Particle volume, half-angle sliced: with shadows",
   flow: "Trails that drift with the current",
 };
+
+/** What is on its way: the date of the picture that playback waits for, or how many tiles of what was chosen. */
+export function progressText(pending: number, waitsForMs: number | undefined): string {
+  if (waitsForMs !== undefined) return `Loading ${dayText(waitsForMs)} …`;
+  return pending > 0 ? `${pending} ${pending === 1 ? "tile" : "tiles"} on the way` : "";
+}
 
 export class Controls {
   /** Room for the legend. */
@@ -28,6 +35,8 @@ export class Controls {
   readonly #product = el("select", { id: "product", "aria-label": "Product" });
   readonly #modes = el("div", { class: "segments", role: "radiogroup", "aria-label": "Mode" });
   readonly #source = el("p", { class: "source" });
+  #pending = 0;
+  #waitsForMs: number | undefined;
   readonly #progress = el("div", { class: "progress", id: "progress", role: "status" });
 
   constructor(container: HTMLElement, store: Store, onRenderView: () => void) {
@@ -93,12 +102,21 @@ export class Controls {
   /** The line of what is on its way; empty when all is there. */
   watch(counts: TileCounts): void {
     counts.onChange(() => {
-      const isBusy = counts.pending > 0;
-      this.#progress.classList.toggle("busy", isBusy);
-      this.#progress.textContent = isBusy
-        ? `${counts.pending} ${counts.pending === 1 ? "tile" : "tiles"} on the way`
-        : "";
+      this.#pending = counts.pending;
+      this.#drawProgress();
     });
+  }
+
+  /** The instant whose picture playback waits for; undefined when it waits for none. */
+  waitFor(timeMs: number | undefined): void {
+    this.#waitsForMs = timeMs;
+    this.#drawProgress();
+  }
+
+  #drawProgress(): void {
+    const text = progressText(this.#pending, this.#waitsForMs);
+    this.#progress.classList.toggle("busy", text !== "");
+    if (this.#progress.textContent !== text) this.#progress.textContent = text;
   }
 
   #modeButton(mode: Mode, isOffered: boolean): HTMLElement {

@@ -14,6 +14,9 @@ const MOST_LAG_MS = 700;
 /** What did not come is not asked for again at once: it would be asked for with every frame of the screen. */
 const AGAIN_MS = 250;
 
+/** A picture that takes longer than this stands still for the eye: it is told which instant is on its way. */
+const LATE_MS = 400;
+
 /** What shows the picture of the state by itself. */
 export interface Follower {
   readonly isFollowing: boolean;
@@ -27,19 +30,23 @@ export class Playback {
   readonly #steps: () => readonly Step[];
   readonly #specAt: (timeMs: number) => LayerSpec | undefined;
   readonly #follower: Follower;
+  readonly #onLate: (timeMs: number | undefined) => void;
 
+  /** `onLate` is told the instant whose picture is waited for, and of none when it is there. */
   constructor(
     store: Store,
     presenter: Presenter,
     steps: () => readonly Step[],
     specAt: (timeMs: number) => LayerSpec | undefined,
     follower: Follower,
+    onLate: (timeMs: number | undefined) => void,
   ) {
     this.#store = store;
     this.#presenter = presenter;
     this.#steps = steps;
     this.#specAt = specAt;
     this.#follower = follower;
+    this.#onLate = onLate;
     store.on(["playing"], (state) => {
       if (state.playing) this.#start();
       else this.#stop();
@@ -57,6 +64,7 @@ export class Playback {
     if (!this.#run) return;
     this.#run.isOver = true;
     this.#run = undefined;
+    this.#onLate(undefined);
     // It stops on what was measured, not between two of it, and never runs back.
     const { timeMs } = this.#store.state;
     if (Number.isFinite(timeMs)) this.#store.set({ timeMs: stepAhead(this.#steps(), timeMs) });
@@ -67,6 +75,7 @@ export class Playback {
     let shownAtMs = performance.now();
     while (!run.isOver) {
       if (this.#follower.isFollowing) {
+        this.#onLate(undefined);
         await this.#follow(run);
         continue;
       }
@@ -77,8 +86,12 @@ export class Playback {
       const spec = this.#specAt(timeMs);
       if (!spec) break;
       const startedMs = performance.now();
+      // After a slow picture the next one is waited for from the start.
+      const late = setTimeout(() => !run.isOver && this.#onLate(timeMs), loadMs < LATE_MS ? LATE_MS : 0);
       const prepared = await this.#presenter.preload(spec);
+      clearTimeout(late);
       loadMs = performance.now() - startedMs;
+      if (!run.isOver && loadMs < LATE_MS) this.#onLate(undefined);
       await until(Math.max(shownAtMs + stride * frameMs, prepared ? 0 : performance.now() + AGAIN_MS));
       if (!prepared) continue;
       // A hand on the slider, a new product or a new look made this picture obsolete while it loaded.

@@ -141,9 +141,14 @@ export function toIso(timeMs: number): string {
 }
 
 export function formatInstant(timeMs: number): string {
+  const time = new Date(timeMs).toISOString().slice(11, 16);
+  return `${dayText(timeMs)}, ${time} UTC`;
+}
+
+/** `16 Jul 2000`. */
+export function dayText(timeMs: number): string {
   const date = new Date(timeMs);
-  const time = date.toISOString().slice(11, 16);
-  return `${date.getUTCDate()} ${MONTHS[date.getUTCMonth()]} ${date.getUTCFullYear()}, ${time} UTC`;
+  return `${date.getUTCDate()} ${MONTHS[date.getUTCMonth()]} ${date.getUTCFullYear()}`;
 }
 
 /** Shortest label that tells all of a step: its year, month or day where it is no more than one, day and hour, or from which to which. */
