@@ -95,6 +95,28 @@ export async function plays(journey) {
   assert.ok(after.timeMs > before.timeMs, "time must have gone on");
 }
 
+/** A phone's layer card has a button for what it has no room for, and it ends above the time bar. */
+export async function phoneReachesAll(journey) {
+  const { page } = journey;
+  const wide = page.viewportSize();
+  const rest = ["#opacity", "#render-view", ".controls .source"];
+  assert.equal(await page.locator("#more").isVisible(), false, "a wide window shows all of it");
+  await page.setViewportSize({ width: 390, height: 844 });
+  for (const part of rest) await page.locator(part).waitFor({ state: "hidden" });
+  await page.locator("#more").click();
+  for (const part of rest) await page.locator(part).waitFor();
+  const [card, bar] = [await page.locator("#controls").boundingBox(), await page.locator("#timeline").boundingBox()];
+  assert.ok(card.y + card.height <= bar.y, "the card must not cover the time bar");
+  await journey.shot("phone");
+  await page.locator("#render-view").click();
+  await page.locator("#view-image").waitFor();
+  await page.keyboard.press("Escape");
+  await page.locator("#more").click();
+  for (const part of rest) await page.locator(part).waitFor({ state: "hidden" });
+  await page.setViewportSize(wide);
+  await journey.until(() => window.fluxglobe.tilesPending === 0);
+}
+
 export async function volumeMode(journey) {
   const { page, watch } = journey;
   const from = watch.responses.length;

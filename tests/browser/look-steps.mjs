@@ -49,6 +49,29 @@ export async function palettesAndReliefsAreOffered(journey) {
   assert.equal(await page.locator("#relief-hint").isVisible(), elevations === 0);
 }
 
+/** A flux lies around 0: a logarithmic scale is no choice until a range above 0 is, and the page says why. */
+export async function logIsOfferedAboveZero(journey) {
+  const { page } = journey;
+  const { legend } = await journey.product();
+  if (legend.low > 0) return "the product's own range lies above 0";
+  const isOffered = () => page.locator('#scale option[value="log"]').evaluate((option) => !option.disabled);
+  assert.equal(await isOffered(), false);
+  assert.match(await page.locator("#scale-hint").innerText(), /above 0/);
+  await page.locator("#range-low").fill("0.5");
+  await page.locator("#range-low").press("Enter");
+  await page.locator("#scale-hint").waitFor({ state: "hidden" });
+  assert.equal(await isOffered(), true);
+  await page.locator("#scale").selectOption("log");
+  await shownIs(journey, `range=0.5:${legend.high}&scale=log`);
+  await page.locator("#range-low").fill("-1");
+  await page.locator("#range-low").press("Enter");
+  await page.locator("#range-problem", { hasText: "above 0" }).waitFor();
+  await page.locator("#range-default").click();
+  await journey.until(() => window.fluxglobe.state.look.range === null && window.fluxglobe.state.look.scale === null);
+  await page.locator("#scale-hint", { hasText: "above 0" }).waitFor();
+  await journey.until(() => window.fluxglobe.tilesPending === 0);
+}
+
 /** A palette other than the product's own, chosen with the keyboard; a range, of which a wrong one is refused first. */
 export async function lookIsAsked(journey) {
   const { page, watch } = journey;

@@ -17,10 +17,11 @@ import {
 import { testHarness } from "./harness-self.mjs";
 import { openBrowser, Watch } from "./harness.mjs";
 import { Journey, LIMIT_MS } from "./journey.mjs";
-import { legendHasUnit, loads, plays, renderedView, sliderMoves, tilesArrive, volumeMode } from "./layer-steps.mjs";
+import { legendHasUnit, loads, phoneReachesAll, plays, renderedView, sliderMoves, tilesArrive, volumeMode } from "./layer-steps.mjs";
 import {
   addressKeepsLook,
   legendWaitsForPicture,
+  logIsOfferedAboveZero,
   lookIsAsked,
   lookIsReset,
   palettesAndReliefsAreOffered,
@@ -78,10 +79,12 @@ test("the viewer", async (t) => {
     await step("plots what a platform that is clicked measured", observationsOfPlatform);
     await step("fetches volume tiles in volume mode", volumeMode);
     await step("shows the rendered view in a dialog", renderedView);
+    await step("reaches all of the layer card on a phone", phoneReachesAll);
     await step("saves a film of the view that plays", filmIsSaved);
     await step("stops a film that is cancelled, and says what is wrong with one that cannot be", filmIsRefused);
     await step("shows that a large picture is on its way, and lets it be cancelled", largePictureIsCancelled);
     await step("offers palettes and reliefs", palettesAndReliefsAreOffered);
+    await step("offers a logarithmic scale where the range lies above 0", logIsOfferedAboveZero);
     await step("draws tiles and legend in a palette and a range that are chosen", lookIsAsked);
     await step("keeps the legend of the picture in sight until the next one is there", legendWaitsForPicture);
     await step("keeps the look in its address", addressKeepsLook);

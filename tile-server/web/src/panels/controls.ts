@@ -35,6 +35,8 @@ export class Controls {
   readonly #product = el("select", { id: "product", "aria-label": "Product" });
   readonly #modes = el("div", { class: "segments", role: "radiogroup", "aria-label": "Mode" });
   readonly #source = el("p", { class: "source" });
+  /** On a phone: opacity, the rendered view and the source, which wide windows always show. */
+  readonly #more = el("button", { type: "button", class: "quiet more", id: "more", "aria-expanded": "false" }, "More");
   #pending = 0;
   #waitsForMs: number | undefined;
   readonly #progress = el("div", { class: "progress", id: "progress", role: "status" });
@@ -60,6 +62,7 @@ export class Controls {
         el("img", { src: "./favicon.svg", alt: "", width: "26", height: "26" }),
         el("h1", {}, "Fluxglobe"),
         this.#progress,
+        this.#more,
       ),
       el("label", { class: "field" }, el("span", { class: "visually-hidden" }, "Product"), this.#product),
       this.#modes,
@@ -75,6 +78,11 @@ export class Controls {
       ),
       this.#source,
     );
+    this.#more.addEventListener("click", () => {
+      const isWhole = container.classList.toggle("whole");
+      this.#more.setAttribute("aria-expanded", String(isWhole));
+      this.#more.textContent = isWhole ? "Less" : "More";
+    });
     store.on(["mode"], () => this.#markMode());
     store.on(["opacity"], (state) => {
       opacity.value = String(state.opacity);
