@@ -34,7 +34,7 @@ import { PlacePanel } from "./panels/place";
 import { ViewDialog } from "./panels/view";
 import { installProbe } from "./probe";
 import { keepAddress } from "./state/address-bar";
-import { FLUX } from "./state/catalogue";
+import { FLUX, isLinear } from "./state/catalogue";
 import { decodeHash } from "./state/hash";
 import { Inventory } from "./state/inventory";
 import { INITIAL, Store } from "./state/store";
@@ -121,6 +121,7 @@ const placePanel = new PlacePanel(panels.bodies.place, {
 const budgetPanel = new BudgetPanel(panels.bodies.budget, {
   store,
   isFlux: () => inventory.product?.quantity === FLUX,
+  hasMean: () => inventory.product !== undefined && isLinear(inventory.product.quantity),
   drawBox: (onChange, onEnd) => pointer.drawBox(onChange, onEnd),
   markRegion: (box) => marks.region(box),
   onError: report,

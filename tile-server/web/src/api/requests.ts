@@ -1,7 +1,7 @@
 //! What the page asks for as JSON, one function a question.
 import { address, getJson } from "./client";
 import type { Parameter } from "./pictures";
-import type { Answer, Budget, BudgetQuery, Check, Legend, Mode, PointSeries, QueryTexts, TileJson } from "./types";
+import type { Answer, Budget, BudgetQuery, Check, Legend, Mode, PointSeries, QueryTexts, RegionMeans, TileJson } from "./types";
 
 export const products = () => getJson<Answer<"products">>(address("api/products")).then((body) => body.products);
 export const regions = () => getJson<Answer<"regions">>(address("api/regions")).then((body) => body.regions);
@@ -33,6 +33,16 @@ export function point(product: string, lon: number, lat: number, signal: AbortSi
 export function pointUrl(product: string, lon: number, lat: number): string {
   const query = { lon: lon.toFixed(4), lat: lat.toFixed(4) } satisfies QueryTexts<"point">;
   return address(`api/products/${encodeURIComponent(product)}/point`, query);
+}
+
+/** Means by area over a budget's region and period, a row a step. */
+export function area(product: string, query: BudgetQuery, signal: AbortSignal): Promise<RegionMeans> {
+  return getJson<RegionMeans>(areaUrl(product, query), signal);
+}
+
+export function areaUrl(product: string, { region, from, to, earth }: BudgetQuery): string {
+  const query = { region, from, to, earth } satisfies QueryTexts<"area">;
+  return address(`api/products/${encodeURIComponent(product)}/area`, query);
 }
 
 export function budget(product: string, query: BudgetQuery, signal: AbortSignal): Promise<Budget> {

@@ -11,6 +11,8 @@ export type TileJson = Schemas["TileJson"];
 export type StepTimes = Schemas["StepTimes"];
 /** The series of a cell; statistics, which the same address gives, are not asked for. */
 export type PointSeries = Extract<Answer<"point">, { series: unknown }>;
+/** The means of a region; statistics, which the same address gives, are not asked for. */
+export type RegionMeans = Extract<Answer<"area">, { series: unknown }>;
 /** What a sum holds, at a place. */
 export type CellCounts = Schemas["CellCounts"];
 export type Quantity = Schemas["Quantity"];

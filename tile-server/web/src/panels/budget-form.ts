@@ -52,6 +52,11 @@ export class BudgetForm {
     ["whole", "Whole"],
     ["ocean-share", "Share of sea"],
   ]);
+  /** What only a sum is asked for with. */
+  readonly #sumFields = [
+    el("label", { class: "field" }, el("span", {}, "Step"), this.#step),
+    el("label", { class: "field" }, el("span", {}, "Coast cells"), this.#cells),
+  ] as const;
   #regions: readonly Region[] = [];
   #steps: readonly Step[] = [];
   #product = "";
@@ -69,9 +74,9 @@ export class BudgetForm {
         { class: "grid-2" },
         el("label", { class: "field" }, el("span", {}, "From"), this.#from),
         el("label", { class: "field" }, el("span", {}, "To"), this.#to),
-        el("label", { class: "field" }, el("span", {}, "Step"), this.#step),
+        this.#sumFields[0],
         el("label", { class: "field" }, el("span", {}, "Earth"), this.#earth),
-        el("label", { class: "field" }, el("span", {}, "Coast cells"), this.#cells),
+        this.#sumFields[1],
       ),
     );
     for (const select of [this.#from, this.#to, this.#step, this.#earth, this.#cells])
@@ -125,6 +130,11 @@ export class BudgetForm {
     if (isBox || this.#region.value !== BOX || region !== "global") this.#region.value = isBox ? BOX : region;
     if (isBox) this.#box.value = boxText(box);
     this.#boxRow.hidden = this.#region.value !== BOX;
+  }
+
+  /** A mean is one of each step as it is, over all cells with data. */
+  showSumFields(areShown: boolean): void {
+    for (const field of this.#sumFields) field.hidden = !areShown;
   }
 
   boundsOf(region: string): Bounds | null {

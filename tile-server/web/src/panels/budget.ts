@@ -1,24 +1,27 @@
-//! The budget panel: region, period and earth in; total, coverage, bars, a table and citable downloads out.
+//! The budget panel: region, period and earth in; total, coverage, bars, a table and citable downloads out; of what is no flux, means.
 import { ApiError } from "../api/client";
 import * as api from "../api/requests";
-import type { Budget, BudgetQuery, BudgetRow, Cells, Region } from "../api/types";
+import type { Budget, BudgetQuery, BudgetRow, Cells, Region, RegionMeans } from "../api/types";
 import type { Bounds } from "../globe/box";
 import { el, icon, saveText } from "../page/dom";
 import { alikeText, areaText, digitsFor, numberText, unitText, valueText } from "../page/format";
 import { DOWNLOAD } from "../page/icons";
 import type { Store } from "../state/store";
-import type { Step } from "../time/steps";
+import { clampToRange, quantise, rangeOf, type Step } from "../time/steps";
 import { BudgetForm } from "./budget-form";
-import { barChart, type Chart } from "./chart";
+import { barChart, type Chart, seriesChart } from "./chart";
 import { budgetCsv } from "./csv";
 import { manifestLine } from "./manifest";
+import { meanSamples, meanView } from "./region-mean";
 
 const TG_PER_PG = 1000;
 
 export interface BudgetContext {
   store: Store;
-  /** The product on show is a flux; of anything else there is no budget to ask for. */
+  /** The product on show is a flux; of anything else there is no budget to ask for, but a mean. */
   isFlux: () => boolean;
+  /** There is something between two of its values: codes and directions have no mean either. */
+  hasMean: () => boolean;
   drawBox: (onChange: (box: Bounds) => void, onEnd: (box: Bounds | undefined) => void) => void;
   markRegion: (box: Bounds | null) => void;
   onError: (key: string, error: unknown) => void;
@@ -30,6 +33,7 @@ export class BudgetPanel {
   readonly #result = el("div", { class: "budget-result", "aria-live": "polite" });
   #asked: AbortController | undefined;
   #chart: Chart | undefined;
+  #steps: readonly Step[] = [];
   /** What the result in sight answers, so that opening the panel again asks nothing twice. */
   #answered = "";
 
@@ -44,6 +48,7 @@ export class BudgetPanel {
     body.append(this.#form.element, this.#result);
     // A new product comes with its steps, through `setSteps`.
     context.store.on(["region", "tab"], () => void this.refresh());
+    context.store.on(["timeMs"], ({ timeMs }) => this.#chart?.setNow(timeMs));
   }
 
   setRegions(regions: readonly Region[]): void {
@@ -51,6 +56,7 @@ export class BudgetPanel {
   }
 
   setSteps(product: string, steps: readonly Step[]): void {
+    this.#steps = steps;
     this.#form.setSteps(product, steps);
     this.#answered = "";
     void this.refresh();
@@ -68,13 +74,15 @@ export class BudgetPanel {
     const isOpen = tab === "budget";
     this.#context.markRegion(isOpen ? this.#form.boundsOf(region) : null);
     this.#form.show(region);
-    if (isOpen && !this.#context.isFlux()) {
-      this.#say("Budgets are sums of a carbon flux; this product is none. Choose a flux to see one.");
+    const isFlux = this.#context.isFlux();
+    this.#form.showSumFields(isFlux);
+    if (isOpen && !isFlux && !this.#context.hasMean()) {
+      this.#say("Budgets are sums of a carbon flux; this product is none, and its values have no mean. Choose another to see one.");
       return;
     }
     const query = isOpen && product !== null ? this.#form.query(region) : undefined;
     if (!query || product === null) return;
-    const key = api.budgetUrl(product, query);
+    const key = isFlux ? api.budgetUrl(product, query) : api.areaUrl(product, query);
     if (key === this.#answered) return;
     this.#answered = key;
     this.#asked?.abort();
@@ -83,6 +91,11 @@ export class BudgetPanel {
     this.#result.classList.add("waiting");
     if (!this.#result.hasChildNodes()) this.#result.append(el("p", { class: "muted busy-line" }, "Adding up …"));
     try {
+      if (!isFlux) {
+        const means = await api.area(product, query, asked.signal);
+        if (!asked.signal.aborted) this.#drawMeans(means, key);
+        return;
+      }
       const [rows, total] = await Promise.all([
         api.budget(product, query, asked.signal),
         api.budget(product, { ...query, step: "total" }, asked.signal),
@@ -105,6 +118,26 @@ export class BudgetPanel {
     this.#chart = undefined;
     this.#result.classList.remove("waiting");
     this.#result.replaceChildren(el("p", { class: "problem" }, problem));
+  }
+
+  #drawMeans(answer: RegionMeans, jsonUrl: string): void {
+    this.#chart?.destroy();
+    this.#chart = undefined;
+    const unit = unitText(answer.unit);
+    const plot = el("div", {
+      class: "plot",
+      id: "mean-plot",
+      role: "img",
+      "data-points": String(answer.series.length),
+      "aria-label": `Mean of ${answer.series.length} periods in ${unit}`,
+    });
+    this.#result.replaceChildren(...meanView(answer, this.#form.titleOf(answer.region), plot, jsonUrl));
+    const { store } = this.#context;
+    const range = rangeOf(this.#steps) ?? { startMs: 0, endMs: 1 };
+    this.#chart = seriesChart(plot, meanSamples(answer), range, unit, (timeMs) => {
+      store.set({ timeMs: quantise(this.#steps, clampToRange(this.#steps, timeMs)) });
+    });
+    this.#chart.setNow(store.state.timeMs);
   }
 
   #draw(query: BudgetQuery, answer: Budget, total: Budget, jsonUrl: string): void {
