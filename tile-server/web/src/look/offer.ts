@@ -1,8 +1,9 @@
 //! What the look panel can offer: catalogue, palettes and state in, the choices that make sense now out.
 import type { Palette } from "../api/types";
-import { alikeText, titleText, unitText } from "../page/format";
+import { titleText, unitText } from "../page/format";
 import type { Catalogue } from "../state/catalogue";
 import type { State } from "../state/store";
+import { tickTexts } from "./legend";
 import { canUncertainty, hasHeight, hasIsolines, hasSea, type Range } from "./look";
 
 export interface PaletteChoice extends Palette {
@@ -60,11 +61,10 @@ export function offerOf(
 }
 
 /** A logarithm has no place for 0 or less, and none for a zero that was agreed upon, as that of °C. */
-function logProblem({ low, high }: Range, unit: string, offset: number): string {
+function logProblem({ low }: Range, unit: string, offset: number): string {
   if (offset !== 0) return `No logarithmic scale: the zero of ${unitText(unit)} was agreed upon.`;
   if (low > 0) return "";
-  const shown = alikeText(low, Math.max(Math.abs(low), Math.abs(high)), 3);
-  return `A logarithmic scale needs a range above 0; this one begins at ${shown}.`;
+  return `A logarithmic scale needs a range above 0; this one begins at ${tickTexts([low]).join()}.`;
 }
 
 function capitalised(name: string): string {
