@@ -4,6 +4,8 @@ import { eventually, hasInk, number } from "./reading.mjs";
 
 /** Sea in every product of the demo, and in sight from where the page begins. */
 const SEA = { lon: -150.5, lat: -5.5 };
+/** Where the page begins. */
+const HOME_LON = -150;
 const LAND = { lon: 10.5, lat: 22.5 };
 
 export async function seriesOfSea(journey) {
@@ -44,6 +46,13 @@ export async function landHasNoData(journey) {
   await page.locator("#no-data").waitFor();
   assert.match(await page.locator("#no-data").innerText(), /no data/i);
   await page.locator("#series-plot").waitFor({ state: "detached" });
+  await turnsHome(journey);
+}
+
+/** Back to where the page began: a typed place that was out of sight has turned the globe. */
+async function turnsHome({ page }) {
+  await page.locator('[aria-label="Back to the start"]').click();
+  await page.waitForFunction((lon) => Math.abs(window.fluxglobe.state.camera.lon - lon) < 0.01, HOME_LON);
 }
 
 /** The far side is turned to, and what is in sight already stays where it is. */
@@ -51,7 +60,6 @@ export async function typedPlaceIsTurnedTo(journey) {
   const { page } = journey;
   const camera = async () => (await journey.state()).camera;
   const type = async ({ lon, lat }) => {
-    await page.locator("#tab-place").click();
     await page.locator("#place-lat").fill(String(lat));
     await page.locator("#place-lon").fill(String(lon));
     await page.locator("#place-lon").press("Enter");
@@ -68,8 +76,7 @@ export async function typedPlaceIsTurnedTo(journey) {
     return Math.abs(camera.lon - lon) < 0.5 && Math.abs(camera.lat - lat) < 0.5;
   }, far);
   assert.ok(await page.evaluate(({ lon, lat }) => window.fluxglobe.project(lon, lat), far));
-  await page.locator('[aria-label="Back to the start"]').click();
-  await journey.until((lon) => Math.abs(window.fluxglobe.state.camera.lon - lon) < 0.5, start.lon);
+  await turnsHome(journey);
 }
 
 /** A longitude from -180 to 180. */
