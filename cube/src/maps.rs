@@ -6,6 +6,7 @@ use std::sync::Arc;
 use contract::chunk::Window;
 use contract::grid::Grid;
 use futures::stream::{self, StreamExt as _, TryStreamExt as _};
+use icechunk::format::Path;
 use zarrs::array::{Array, AsyncArrayShardedReadableExt as _, AsyncArrayShardedReadableExtCache};
 use zarrs::storage::byte_range::ByteRange;
 use zarrs_icechunk::AsyncIcechunkStore;
@@ -14,7 +15,7 @@ use crate::arrays::Definition;
 use crate::error::first_lines;
 use crate::field::{Decoder, Number};
 use crate::unreadable::Object;
-use crate::{CubeError, Layout, arrays, axis};
+use crate::{CubeError, Layout, arrays, axis, shards};
 
 /// Chunks that are read and decoded at a time.
 const CHUNKS_AT_ONCE: usize = 8;
@@ -97,27 +98,39 @@ impl<T: Number> Maps<T> {
         match self.decoded(index).await {
             Ok(values) => Ok(values),
             Err(reason) => {
-                let layout = &self.layout;
-                let [rows, cols] = [0, 1].map(|at| layout.object[at] / layout.chunk[at]);
                 let object = Object {
                     array: &self.array,
                     place: &self.place,
-                    index: [
-                        index[0],
-                        index[1] / u64::from(rows),
-                        index[2] / u64::from(cols),
-                    ],
+                    index: self.object_of(index),
                 };
                 Err(object.unreadable(index, &reason).await)
             }
         }
     }
 
+    /// The object that holds a chunk.
+    fn object_of(&self, index: [u64; 3]) -> [u64; 3] {
+        let layout = &self.layout;
+        let [rows, cols] = [0, 1].map(|at| u64::from(layout.object[at] / layout.chunk[at]));
+        [index[0], index[1] / rows, index[2] / cols]
+    }
+
+    /// Does the repository name the object of a chunk?
+    async fn is_named(&self, index: [u64; 3]) -> Result<bool, String> {
+        let path = Path::new(self.array.path().as_str()).map_err(|e| e.to_string())?;
+        shards::is_named(&self.array, &path, self.object_of(index)).await
+    }
+
     async fn decoded(&self, index: [u64; 3]) -> Result<Option<Vec<T>>, String> {
         let found = if self.layout.is_sharded() {
             let place = self.array.async_subchunk_byte_range(&self.shards, &index);
-            // The library gives what the index has, where a chunk that is not stored has no place but all bits set, and would read it there.
-            let place = place.await.map_err(|e| first_lines(&e))?;
+            let place = match place.await {
+                Ok(place) => place,
+                // Of a shard that is not stored the library says that it cannot be found.
+                Err(_) if !self.is_named(index).await? => return Ok(None),
+                Err(error) => return Err(first_lines(&error)),
+            };
+            // It gives what the index has, where a chunk that is not stored has no place but all bits set, and would read it there.
             if place.is_none_or(|place| matches!(place, ByteRange::FromStart(u64::MAX, _))) {
                 return Ok(None);
             }

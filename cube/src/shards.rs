@@ -107,9 +107,18 @@ impl Shards<'_> {
 
     /// Does the repository name a shard? None without data is.
     pub(crate) async fn is_named(&self, shard: [u64; 3]) -> Result<bool, String> {
-        let index = ChunkIndices(shard.iter().map(|at| *at as u32).collect());
-        let session = self.array.storage().session();
-        let payload = session.read().await.get_chunk_ref(self.path, &index).await;
-        Ok(payload.map_err(|e| first_lines(&e))?.is_some())
+        is_named(self.array, self.path, shard).await
     }
+}
+
+/// Does the repository name an object of an array? None without data is.
+pub(crate) async fn is_named(
+    array: &Array<AsyncIcechunkStore>,
+    path: &Path,
+    object: [u64; 3],
+) -> Result<bool, String> {
+    let index = ChunkIndices(object.iter().map(|at| *at as u32).collect());
+    let session = array.storage().session();
+    let payload = session.read().await.get_chunk_ref(path, &index).await;
+    Ok(payload.map_err(|e| first_lines(&e))?.is_some())
 }

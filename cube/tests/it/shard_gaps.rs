@@ -14,9 +14,10 @@ use crate::product::{bits, grid, month, values};
 
 const STEPS: u32 = 20;
 
-/// Values of a month: whole chunks of columns hold none.
+/// Values of a month: whole chunks of columns hold none, and all of the second shard does not.
 fn with_land(grid: &contract::grid::Grid, seed: u32) -> Vec<f32> {
-    let land = |cell: usize| (400..2100).contains(&(cell % grid.cols as usize));
+    let is_land = |col: usize| (400..2100).contains(&col) || (4000..8200).contains(&col);
+    let land = |cell: usize| is_land(cell % grid.cols as usize);
     let sea = values(grid, seed);
     let cells = sea.iter().enumerate();
     cells
@@ -59,7 +60,14 @@ async fn a_chunk_of_a_shard_without_data_is_no_data_to_every_reader() {
     let cube = repository.at(&At::Newest).await.unwrap();
     let expected = with_land(&grid, 3);
     assert_eq!(bits(&cube.field(2).await.unwrap()), bits(&expected));
-    for (col, cols) in [(505, 505), (390, 700), (1200, 1), (2000, 300)] {
+    for (col, cols) in [
+        (505, 505),
+        (390, 700),
+        (1200, 1),
+        (2000, 300),
+        (3990, 20),
+        (5000, 3300),
+    ] {
         let window = Window {
             row: 1,
             col,
@@ -79,7 +87,7 @@ async fn a_chunk_of_a_shard_without_data_is_no_data_to_every_reader() {
     let found = Values::of(&store, &Arc::new(manifest.clone()))
         .await
         .unwrap();
-    for col in [390, 1200, 2099, 2100, 33_299] {
+    for col in [390, 1200, 2099, 2100, 6000, 33_299] {
         let cell = found.cell(3, col).await.unwrap();
         let at = (3 * grid.cols + col) as usize;
         let own: Vec<f32> = (1..=STEPS)
