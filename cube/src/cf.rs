@@ -13,6 +13,9 @@ use crate::rounding::KEPT_BITS;
 /// Unit of the time coordinate; instants are whole milliseconds, so that no time is rounded.
 pub(crate) const TIME_UNITS: &str = "milliseconds since 1970-01-01 00:00:00";
 
+/// The ellipsoid of latitudes by the name that other programs know it by, EPSG:4326 (OGC 18-010r7).
+pub const WGS84_WKT: &str = r#"GEOGCRS["WGS 84",DATUM["World Geodetic System 1984",ELLIPSOID["WGS 84",6378137,298.257223563,LENGTHUNIT["metre",1]]],PRIMEM["Greenwich",0,ANGLEUNIT["degree",0.0174532925199433]],CS[ellipsoidal,2],AXIS["geodetic latitude (Lat)",north,ORDER[1],ANGLEUNIT["degree",0.0174532925199433]],AXIS["geodetic longitude (Lon)",east,ORDER[2],ANGLEUNIT["degree",0.0174532925199433]],ID["EPSG",4326]]"#;
+
 /// Names of the arrays beside the values.
 const OTHERS: [&str; 11] = [
     "bnds",

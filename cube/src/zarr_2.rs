@@ -8,6 +8,8 @@ use std::collections::BTreeMap;
 use bytes::Bytes;
 use serde_json::{Map, Value, json};
 
+use crate::cf;
+
 /// Bytes of the checksum behind each chunk of version 3.
 pub(crate) const CHECKSUM_BYTES: usize = 4;
 /// Bytes of an entry of a shard's index: where a chunk begins, and how long it is.
@@ -138,6 +140,10 @@ impl Array2 {
         };
         // What version 2 says by the fill value.
         attributes.remove("_FillValue");
+        // GDAL knows the ellipsoid by this alone for what it is.
+        if attributes.contains_key("grid_mapping_name") {
+            attributes.insert("crs_wkt".to_owned(), cf::WGS84_WKT.into());
+        }
         let dimensions = match &metadata["dimension_names"] {
             Value::Array(names) => names.clone(),
             _ => vec![],

@@ -21,9 +21,6 @@ const DEFLATE_LEVEL: u8 = 4;
 /// Unit of time. Whole seconds are exact in 64 bits, and every program knows them.
 const TIME_UNITS: &str = "seconds since 1970-01-01 00:00:00";
 
-/// The ellipsoid of latitudes by the name that other programs know it by, EPSG:4326 (OGC 18-010r7).
-const WGS84: &str = r#"GEOGCRS["WGS 84",DATUM["World Geodetic System 1984",ELLIPSOID["WGS 84",6378137,298.257223563,LENGTHUNIT["metre",1]]],PRIMEM["Greenwich",0,ANGLEUNIT["degree",0.0174532925199433]],CS[ellipsoidal,2],AXIS["geodetic latitude (Lat)",north,ORDER[1],ANGLEUNIT["degree",0.0174532925199433]],AXIS["geodetic longitude (Lon)",east,ORDER[2],ANGLEUNIT["degree",0.0174532925199433]],ID["EPSG",4326]]"#;
-
 /// The file as it is being written.
 pub struct NetCdf {
     path: PathBuf,
@@ -152,7 +149,10 @@ fn begin(
     let corner = corner(&description.grid);
     texts(
         &crs,
-        &[("crs_wkt", WGS84), ("GeoTransform", corner.as_str())],
+        &[
+            ("crs_wkt", cube::cf::WGS84_WKT),
+            ("GeoTransform", corner.as_str()),
+        ],
     )?;
     let values = write_values(
         &file,
