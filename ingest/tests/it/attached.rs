@@ -785,7 +785,7 @@ async fn of_other_dimensions_one_index_is_read() {
     request.indexes = vec![("depth".to_owned(), 0), ("depth".to_owned(), 1)];
     let error = own.ask(&request).await.unwrap_err();
     assert!(
-        error.contains("depth: is to be read at the index 0 and at 1"),
+        error.contains("\"depth=1\"") && error.contains("one index of each dimension"),
         "{error}"
     );
     request.indexes = vec![("depth".to_owned(), 0)];

@@ -42,6 +42,14 @@ impl Slack {
     /// That of labels, degrees, which are off by so much from even places `step_deg` apart: a label that was rounded stands as
     /// unevenly as it was rounded. Steps and offsets that labels are worked out with are of single precision at times.
     pub(super) fn of(labels: &[f64], step_deg: f64, uneven_deg: f64) -> Self {
+        // The width of one cell alone is told beside its label, and what it is off by would count as often as it goes into the way from 0.
+        if labels.len() == 1 {
+            return Self {
+                edge_deg: DIGIT_NOISE,
+                drift_deg: DIGIT_NOISE,
+                half_digit: 0.0,
+            };
+        }
         let farthest = labels
             .iter()
             .fold(0.0, |most: f64, label| most.max(label.abs()));
