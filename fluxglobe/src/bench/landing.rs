@@ -1,5 +1,5 @@
 //! `fluxglobe bench landing`: one frame landed into products of more and more steps: time, requests and bytes; and how long a
-//! window of 256 x 256 cells of it, and of its first coarser level, takes to read.
+//! window of 256 x 256 cells of it, and of each of its coarser levels, takes to read.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -51,8 +51,8 @@ struct Row {
     background_bytes: u64,
     /// A window of the frame: the first one of a process, and the median of others elsewhere, ms.
     window_ms: [f64; 2],
-    /// The same of the first coarser level, median of all; none of a grid without levels.
-    level_window_ms: Option<f64>,
+    /// The same of each coarser level, from the first on, median of all; none of a grid without levels.
+    level_window_ms: Vec<f64>,
 }
 
 pub(crate) async fn run(options: &BenchLanding) -> Result<()> {
@@ -188,8 +188,8 @@ async fn landed(
 }
 
 /// Reads windows of the newest step, spread over the grid: the first, its cube opened, and the median of the others, ms; and the
-/// median of those of the first coarser level.
-async fn windows(store: &Store, manifest: &Manifest) -> Result<([f64; 2], Option<f64>)> {
+/// medians of those of its coarser levels.
+async fn windows(store: &Store, manifest: &Manifest) -> Result<([f64; 2], Vec<f64>)> {
     let (fresh, _traffic) = store.counted();
     let begun = Instant::now();
     let repository = Repository::open(&fresh, &cube::folder(&manifest.product)).await?;
@@ -200,12 +200,13 @@ async fn windows(store: &Store, manifest: &Manifest) -> Result<([f64; 2], Option
     let first_ms = opened_ms + took.remove(0);
     took.sort_by(f64::total_cmp);
     let of_cells = [first_ms, super::quantile(&took, 0.5)];
-    let Some(level) = cube.levels().next().copied() else {
-        return Ok((of_cells, None));
-    };
-    let mut took = windows_of(&cube, step, level.number, &level.grid).await?;
-    took.sort_by(f64::total_cmp);
-    Ok((of_cells, Some(super::quantile(&took, 0.5))))
+    let mut of_levels = vec![];
+    for level in cube.levels() {
+        let mut took = windows_of(&cube, step, level.number, &level.grid).await?;
+        took.sort_by(f64::total_cmp);
+        of_levels.push(super::quantile(&took, 0.5));
+    }
+    Ok((of_cells, of_levels))
 }
 
 /// How long each of some windows of a level took to read, ms.
@@ -248,7 +249,7 @@ fn table(rows: &[Row]) -> Table {
         "MB",
         "window ms",
         "again ms",
-        "level ms",
+        "levels ms",
     ]);
     let mb = |bytes: u64| format!("{:.2}", bytes as f64 / 1e6);
     for row in rows {
@@ -270,7 +271,10 @@ fn table(rows: &[Row]) -> Table {
             format!("{:.1}", row.window_ms[0]),
             format!("{:.1}", row.window_ms[1]),
             row.level_window_ms
-                .map_or_else(String::new, |ms| format!("{ms:.1}")),
+                .iter()
+                .map(|ms| format!("{ms:.1}"))
+                .collect::<Vec<_>>()
+                .join(" "),
         ]);
     }
     table
