@@ -1,6 +1,6 @@
 //! Products as others read them, in a folder and in a bucket of a real S3 server: xarray over plain Zarr, and Icechunk over the store itself;
 //! and zarrita, as pages do, at the address of a server. Values, times, bounds and places are those of the source file to the last bit,
-//! and coarser levels what numpy makes of them.
+//! coarser levels what numpy makes of them, and what is said of these what the multiscales convention asks for.
 
 use std::path::Path;
 use std::process::Command;
@@ -8,11 +8,12 @@ use std::process::Command;
 use harness::program;
 use harness::server::Server;
 use harness::servers::Servers;
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use crate::browser;
 
 const INTEROP: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/reference/interop.py");
+const MULTISCALES: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/reference/multiscales.py");
 
 /// A run of a script with what reaches servers: what it printed, or what it found otherwise.
 fn python(script: &str, settings: &[(String, String)], words: &[&str]) -> Result<String, String> {
@@ -144,4 +145,62 @@ fn zarrita_finds_values_times_places_and_levels_of_the_source_file_at_an_address
     std::fs::write(&groups, told.replacen("1.5,1.5", "1.5,2", 1)).unwrap();
     let error = compare(&file).unwrap_err();
     assert!(error.contains("levels/1: lon is 0.0625"), "{error}");
+}
+
+#[test]
+fn the_document_of_a_product_tells_of_its_levels_by_the_multiscales_convention() {
+    let folder = tempfile::tempdir().unwrap();
+    let (server, _file) = served(folder.path());
+    let document = server.get("/zarr/sst/zarr.json").unwrap().json().unwrap();
+    let path = folder.path().join("zarr.json");
+    let checked = |document: &Value| {
+        std::fs::write(&path, document.to_string()).unwrap();
+        python(MULTISCALES, &[], &[path.to_str().unwrap()])
+    };
+    let assets: Value = serde_json::from_str(&checked(&document).unwrap()).unwrap();
+    let expected = [
+        "sea_surface_temperature",
+        "levels/1/sea_surface_temperature",
+        "levels/2/sea_surface_temperature",
+    ];
+    assert_eq!(assets, json!(expected));
+    let declared = "zarr_conventions/0/schema_url";
+    let before =
+        "https://raw.githubusercontent.com/zarr-conventions/multiscales/refs/tags/v1/schema.json";
+    for (place, value, reason) in [
+        (declared, json!(before), "zarr_conventions"),
+        ("multiscales/layout", json!([]), "multiscales.layout"),
+        (
+            "multiscales/layout/1/asset",
+            json!("/levels/1"),
+            "layout[1]",
+        ),
+        ("multiscales/layout/1/transform", json!({}), "layout[1]"),
+        (
+            "multiscales/layout/2/asset",
+            json!("levels/3"),
+            "levels/3 is no array",
+        ),
+        (
+            "multiscales/layout/2/derived_from",
+            json!("levels/2"),
+            "not listed before",
+        ),
+        (
+            "multiscales/layout/2/transform/scale/1",
+            json!(2.0),
+            "its scales lead from",
+        ),
+        (
+            "multiscales/layout/1/transform/translation",
+            json!([0.0]),
+            "1 numbers for 3 dimensions",
+        ),
+    ] {
+        let mut changed = document.clone();
+        let at = changed.pointer_mut(&format!("/attributes/{place}"));
+        *at.unwrap() = value;
+        let error = checked(&changed).unwrap_err();
+        assert!(error.contains(reason), "{place}: {error}");
+    }
 }
