@@ -31,7 +31,7 @@ fn python(script: &str, settings: &[(String, String)], words: &[&str]) -> Result
 }
 
 /// Did the comparison find all values of a place, and both levels where it has them?
-fn is_whole(told: &Value, place: &str) {
+fn assert_whole(told: &Value, place: &str) {
     assert!(
         told["values"].as_u64().unwrap() > 2_500_000,
         "{place}: {told}"
@@ -103,7 +103,7 @@ fn python_finds_values_times_places_and_levels_of_the_source_file_in_a_folder_an
     let all: Vec<&str> = places.iter().map(String::as_str).collect();
     let told: Value = serde_json::from_str(&compare(&all).unwrap()).unwrap();
     for place in &places {
-        is_whole(&told[place], place);
+        assert_whole(&told[place], place);
     }
     // The comparison sees one step in the place of another, and one value of three million.
     let chunk = |step: u32| format!("{zarr}/sea_surface_temperature/c/{step}/0/0");
@@ -128,7 +128,7 @@ fn zarrita_finds_values_times_places_and_levels_of_the_source_file_at_an_address
     let place = format!("zarrita:{read}");
     let compare = |file: &str| python(INTEROP, &[], &["compare", file, &place]);
     let told: Value = serde_json::from_str(&compare(&file).unwrap()).unwrap();
-    is_whole(&told[&place], &place);
+    assert_whole(&told[&place], &place);
     // The comparison sees one value of three million, a value of a level, and levels that do not lie where it is said.
     let changed = path("changed.nc");
     python(INTEROP, &[], &["make", &changed, "one"]).unwrap();
