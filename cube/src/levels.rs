@@ -316,7 +316,8 @@ fn level_attributes(description: &Description, level: &level::Level) -> Map<Stri
     }))
 }
 
-/// Attributes of the group of all, with what the multiscales convention wants to be told of the levels.
+/// Attributes of the group of all, with what the multiscales convention (zarr-conventions, v0.1) wants to be told of the levels. Its schema
+/// knows them by these very addresses.
 pub(crate) fn with_levels(description: &Description) -> Map<String, Value> {
     let mut attributes = description.attributes();
     let levels = level::levels(&description.grid);
@@ -344,8 +345,8 @@ pub(crate) fn with_levels(description: &Description) -> Map<String, Value> {
         (from, before) = (asset(level), level.cells);
     }
     let convention = json!([{
-        "schema_url": "https://raw.githubusercontent.com/zarr-conventions/multiscales/refs/tags/v1/schema.json",
-        "spec_url": "https://github.com/zarr-conventions/multiscales/blob/v1/README.md",
+        "schema_url": "https://raw.githubusercontent.com/zarr-conventions/multiscales/refs/tags/v0.1/schema.json",
+        "spec_url": "https://github.com/zarr-conventions/multiscales/blob/v0.1/README.md",
         "uuid": "d35379db-88df-4056-af3a-620245f8e347",
         "name": "multiscales",
         "description": "Multiscale layout of zarr datasets",

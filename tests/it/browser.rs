@@ -13,7 +13,7 @@ use crate::end_to_end::demo_data;
 
 const BROWSER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/browser");
 /// What `package.json` asks for.
-const PACKAGES: [&str; 4] = ["playwright-core", "maplibre-gl", "ol", "leaflet"];
+const PACKAGES: [&str; 5] = ["playwright-core", "maplibre-gl", "ol", "leaflet", "zarrita"];
 const PROFILE: &str = concat!(
     env!("CARGO_MANIFEST_DIR"),
     "/../ingest/profiles/takahashi09-flux.toml"
@@ -132,6 +132,20 @@ fn install_packages(folder: &Path) {
         "{}",
         String::from_utf8_lossy(&install.stderr)
     );
+}
+
+/// Runs a script of this folder in Node, without a browser, with the packages it needs.
+pub(crate) fn script(file: &str, words: &[&str]) {
+    let folder = Path::new(BROWSER);
+    install_packages(folder);
+    let output = Command::new("node")
+        .arg(file)
+        .args(words)
+        .current_dir(folder)
+        .output()
+        .unwrap();
+    let talk = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{file} {words:?}: {talk}");
 }
 
 /// Runs a file of tests in a browser, with the packages it needs.

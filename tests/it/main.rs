@@ -18,6 +18,7 @@ mod end_to_end;
 mod exported;
 mod harness_self;
 mod interop;
+mod large_map;
 mod logged;
 mod masks;
 mod migrate;

@@ -4,11 +4,12 @@
     interop.py make FILE [one]        writes a NetCDF file: three months of a temperature with gaps, on a grid that has two coarser levels;
                                       with `one` the last bit of one value is another
     interop.py compare FILE PLACE...  PLACE is zarr:CUBE or icechunk:REPOSITORY, a folder or s3://BUCKET/PREFIX with the variables
-                                      AWS_ENDPOINT_URL, AWS_REGION, AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY
+                                      AWS_ENDPOINT_URL, AWS_REGION, AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY;
+                                      or zarrita:FOLDER, what tests/browser/zarrita.mjs read at an address of the server
 
 Shares nothing with Fluxglobe: values, times, bounds and places are those of the file to the last bit; coarser levels, which a
-repository has, are means by area that numpy computes here by the rule of docs/decisions/032-levels.md. Prints JSON: how much was
-compared.
+repository and an address have, are means by area that numpy computes here by the rule of docs/decisions/032-levels.md, and lie where
+the attributes of the multiscales convention say. Prints JSON: how much was compared.
 """
 
 import json
@@ -69,6 +70,8 @@ def make(file, is_one_other):
 def opened(place, group=None):
     """A group of a place, with nothing but what xarray, zarr and Icechunk have."""
     kind, _, path = place.partition(":")
+    if kind == "zarrita":
+        return read_by_zarrita(path, group or "")
     address = urlparse(path)
     is_bucket = address.scheme == "s3"
     if kind == "zarr":
@@ -104,6 +107,16 @@ def opened(place, group=None):
         storage = icechunk.local_filesystem_storage(path)
     session = icechunk.Repository.open(storage).readonly_session("main")
     return xr.open_zarr(session.store, group=group, consolidated=False)
+
+
+def read_by_zarrita(folder, group):
+    with open(f"{folder}/groups.json") as file:
+        told = json.load(file)[group]
+    variables = {}
+    for name, array in told["arrays"].items():
+        values = np.fromfile(array["values"], array["type"]).reshape(array["shape"])
+        variables[name] = (array["dimensions"], values, array["attributes"])
+    return xr.decode_cf(xr.Dataset(variables, attrs=told["attributes"]))
 
 
 def same(found, expected, what):
@@ -191,6 +204,26 @@ def check_level(data, values, side, what):
     return compared
 
 
+def check_lie(data, level, number, what):
+    """Centres of whole blocks lie where scales and translations of indices of the multiscales convention lead, from level to level."""
+    layout = data.attrs["multiscales"]["layout"]
+    entry = layout[number]
+    assert entry["asset"] == f"levels/{number}/{name_of(level)}", (what, entry)
+    scale, translation = np.ones(3), np.zeros(3)
+    assets = {entry["asset"]: entry for entry in layout}
+    while "derived_from" in entry:
+        own = entry["transform"]
+        scale, translation = scale * own["scale"], translation * own["scale"] + own["translation"]
+        entry = assets[entry["derived_from"]]
+    assert entry["asset"] == name_of(data), (what, entry)
+    for axis, name in enumerate(["lat", "lon"], start=1):
+        whole = data[name].size // int(scale[axis])
+        cells = np.arange(whole) * scale[axis] + translation[axis]
+        expected = np.interp(cells, np.arange(data[name].size), data[name].values)
+        off = np.abs(level[name].values[:whole] - expected).max()
+        assert off < 1e-9, f"{what}: {name} is {off} degrees from where the attributes lead"
+
+
 def name_of(data):
     """The one array of values: what lies along time and the map, and is no coverage."""
     (name,) = [name for name in data.data_vars if data[name].dims == ("time", "lat", "lon") and name != "coverage"]
@@ -211,12 +244,13 @@ def compare(file, places):
         same(data["lon"].values, lon, f"{place} lon of the file")
         levels = []
         side, count = LEVEL_CELLS, max(ROWS, COLS)
-        while place.startswith("icechunk:") and count > COARSEST_SIDE:
+        while not place.startswith("zarr:") and count > COARSEST_SIDE:
             number, count = len(levels) + 1, -(-count // LEVEL_CELLS)
             what = f"{place} levels/{number}"
             level = opened(place, f"levels/{number}")
             check_times(level, what)
             check_places(level, side, what)
+            check_lie(data, level, number, what)
             levels.append(check_level(level, values, side, what))
             side *= LEVEL_CELLS
         told[place] = {"values": compared, "levels": levels}
