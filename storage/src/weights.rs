@@ -1,6 +1,8 @@
 //! Weights: the area of a region's share of every cell, a row a chunk, computed once and used for every step.
 
-use std::collections::VecDeque;
+mod areas;
+
+use std::borrow::Cow;
 use std::sync::{Arc, LazyLock};
 
 use arrow::array::{ArrayRef, Float64Builder, ListBuilder, RecordBatch, UInt32Array};
@@ -11,6 +13,8 @@ use contract::key::ObjectKey;
 use crate::row_check::RowCheck;
 use crate::sound::{self, Soundness, damage};
 use crate::{StorageError, Store, parquet_table};
+
+pub use areas::{SharedAreas, Sharing};
 
 /// Version of the layout: part of what weights are named by.
 pub const LAYOUT: u32 = 2;
@@ -30,50 +34,11 @@ fn area_field() -> Arc<Field> {
     Arc::new(Field::new("item", DataType::Float64, false))
 }
 
-/// Areas of the cells of a chunk that others may share: those of chunks side by side in the sea are the same.
-pub type SharedAreas = Arc<[f64]>;
-
-/// Areas that are held once, however many chunks have them.
-#[derive(Debug, Default)]
-pub struct Sharing {
-    /// The last ones that differ from each other.
-    last: VecDeque<SharedAreas>,
-    distinct_bytes: u64,
-}
-
-impl Sharing {
-    /// Areas that are compared with: along a row of chunks the sea's, and those of a few coasts.
-    const COMPARED: usize = 8;
-
-    /// The same areas, of which others have a part if they were there just before.
-    pub fn of(&mut self, areas_m2: &[f64]) -> SharedAreas {
-        let is_same = |own: &&SharedAreas| {
-            own.len() == areas_m2.len()
-                && own
-                    .iter()
-                    .zip(areas_m2)
-                    .all(|(a, b)| a.to_bits() == b.to_bits())
-        };
-        if let Some(own) = self.last.iter().rev().find(is_same) {
-            return Arc::clone(own);
-        }
-        let own: SharedAreas = areas_m2.into();
-        self.distinct_bytes += size_of_val(areas_m2) as u64;
-        if self.last.len() == Self::COMPARED {
-            self.last.pop_front();
-        }
-        self.last.push_back(Arc::clone(&own));
-        own
-    }
-
-    /// What the areas take that are held, bytes.
-    pub fn distinct_bytes(&self) -> u64 {
-        self.distinct_bytes
-    }
-}
-
 /// Bytes of the weights of some chunks, in the order of their numbers; they are the same however areas are held.
-pub fn encode<A: AsRef<[f64]>>(chunks: &[(u32, A)]) -> Result<Bytes, StorageError> {
+pub fn encode<A>(chunks: &[(u32, A)]) -> Result<Bytes, StorageError>
+where
+    for<'a> Cow<'a, [f64]>: From<&'a A>,
+{
     let mut table =
         parquet_table::Writer::new(vec![], &SCHEMA, CHUNKS_PER_GROUP, &[chunks.len() as u32])?;
     for group in chunks.chunks(CHUNKS_PER_GROUP) {
@@ -82,21 +47,23 @@ pub fn encode<A: AsRef<[f64]>>(chunks: &[(u32, A)]) -> Result<Bytes, StorageErro
     table.finish().map(Bytes::from)
 }
 
-fn batch<A: AsRef<[f64]>>(chunks: &[(u32, A)]) -> Result<RecordBatch, StorageError> {
+fn batch<A>(chunks: &[(u32, A)]) -> Result<RecordBatch, StorageError>
+where
+    for<'a> Cow<'a, [f64]>: From<&'a A>,
+{
     let mut lists = ListBuilder::new(Float64Builder::new()).with_field(area_field());
-    for (_, areas) in chunks {
-        lists.values().append_slice(areas.as_ref());
+    let mut checks = Vec::with_capacity(chunks.len());
+    for (chunk, areas) in chunks {
+        let areas = Cow::from(areas);
+        lists.values().append_slice(&areas);
         lists.append(true);
+        checks.push(RowCheck::new().u32(*chunk).f64s(&areas).finish());
     }
     let numbers = chunks.iter().map(|(chunk, _)| *chunk);
-    let check = |(chunk, areas): &(u32, A)| {
-        let check = RowCheck::new().u32(*chunk);
-        check.f64s(areas.as_ref()).finish()
-    };
     let columns: Vec<ArrayRef> = vec![
         Arc::new(UInt32Array::from_iter_values(numbers)),
         Arc::new(lists.finish()),
-        Arc::new(UInt32Array::from_iter_values(chunks.iter().map(check))),
+        Arc::new(UInt32Array::from_iter_values(checks)),
     ];
     RecordBatch::try_new(Arc::clone(&SCHEMA), columns)
         .map_err(|e| StorageError::damaged("weights to write", e))
@@ -153,20 +120,26 @@ fn sealed(key: &ObjectKey, soundness: Soundness) -> Result<(), StorageError> {
 }
 
 /// Stores weights under the key of the job they were computed for.
-pub async fn write<A: AsRef<[f64]>>(
+pub async fn write<A>(
     store: &Store,
     key: &ObjectKey,
     chunks: &[(u32, A)],
-) -> Result<(), StorageError> {
+) -> Result<(), StorageError>
+where
+    for<'a> Cow<'a, [f64]>: From<&'a A>,
+{
     store.put_new(key, encode(chunks)?).await.map(|_new| ())
 }
 
 /// The same in the place of weights that were found damaged.
-pub async fn write_over<A: AsRef<[f64]>>(
+pub async fn write_over<A>(
     store: &Store,
     key: &ObjectKey,
     chunks: &[(u32, A)],
-) -> Result<(), StorageError> {
+) -> Result<(), StorageError>
+where
+    for<'a> Cow<'a, [f64]>: From<&'a A>,
+{
     store.put_over(key, encode(chunks)?).await
 }
 
@@ -196,15 +169,7 @@ mod tests {
         let shared = decode_shared(&key, content.clone()).unwrap();
         assert_eq!(encode(&shared).unwrap(), content);
         assert_eq!(decode(&key, content).unwrap(), chunks);
-        assert!(Arc::ptr_eq(&shared[0].1, &shared[199].1));
-        let mut sharing = Sharing::default();
-        for (_, areas) in &chunks {
-            drop(sharing.of(areas));
-        }
-        assert_eq!(sharing.distinct_bytes(), 2 * 8 * 7200);
-        // No zero is held for another one.
-        let zeros = [sharing.of(&[0.0]), sharing.of(&[-0.0])];
-        assert_ne!(zeros[0][0].to_bits(), zeros[1][0].to_bits());
+        assert_eq!(shared[0].1.address(), shared[199].1.address());
     }
 
     #[tokio::test]

@@ -94,15 +94,14 @@ impl BandShares {
         let windows = field_chunks(&self.grid);
         for (chunk, areas_m2) in self.whole.chunks() {
             let window = windows[chunk as usize];
-            let rows = areas_m2.chunks_exact(window.cols as usize);
-            for (row, areas_m2) in (window.row..).zip(rows) {
+            let mut row_start = 0;
+            for row in window.row..window.row + window.rows {
                 let least_m2 = self.least_m2[row as usize];
-                for (col, _) in (window.col..)
-                    .zip(areas_m2)
-                    .filter(|(_, m2)| **m2 > least_m2)
-                {
-                    take(row, col);
+                let own = row_start..row_start + window.cols as usize;
+                for (cells, _) in areas_m2.runs(own).filter(|(_, m2)| *m2 > least_m2) {
+                    cells.for_each(|cell| take(row, window.col + (cell - row_start) as u32));
                 }
+                row_start += window.cols as usize;
             }
         }
     }

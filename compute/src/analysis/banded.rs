@@ -88,7 +88,7 @@ impl Banded {
         )
         .map_err(weights_failed)?;
         let grid = &manifest.grid;
-        let on_grid_m2: f64 = whole.chunks().flat_map(|(_, areas_m2)| areas_m2).sum();
+        let on_grid_m2: f64 = whole.cells().sum();
         let shares = BandShares::new((grid, query.earth), whole, sea);
         let touched = shares
             .touched()

@@ -220,7 +220,7 @@ impl Row {
         let [start, end] = self.ends;
         for (chunk, areas) in areas.chunks().filter(|(chunk, _)| own.contains(chunk)) {
             let cells = windows[chunk as usize].cell_indices(grid);
-            for (cell, area_m2) in cells.map(|cell| cell - first).zip(areas) {
+            for (cell, area_m2) in cells.map(|cell| cell - first).zip(areas.iter()) {
                 let until_ms = |time: Until<usize>| time.with_data_ms(counts_ms, cell);
                 match until_ms(end) - until_ms(start) {
                     0 => {}
@@ -309,7 +309,7 @@ mod tests {
         let (mut complete_m2, mut incomplete_m2) = (0.0, 0.0);
         for (chunk, areas) in areas.chunks() {
             let cells = field_chunks(&GRID)[chunk as usize].cell_indices(&GRID);
-            for (cell, area_m2) in cells.zip(areas) {
+            for (cell, area_m2) in cells.zip(areas.iter()) {
                 let own = (1..)
                     .zip(steps)
                     .filter(|(number, _)| has_data(cell, *number));

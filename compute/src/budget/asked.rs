@@ -33,10 +33,11 @@ impl WeighedRegion {
             weights.map_err(weights_failed)
         };
         let (whole, sea) = (weighed(&weights.all).await?, weighed(&weights.ocean).await?);
-        let sea_steps = band_areas(grid, sea.chunks())
+        let sea_areas = sea.chunks().map(|(chunk, areas)| (chunk, areas.to_vec()));
+        let sea_steps = band_areas(grid, sea_areas)
             .map_err(|e| ComputeError::inconsistent(weights.keys.ocean.as_str(), e))?;
         Ok(Self {
-            on_grid_m2: whole.chunks().flat_map(|(_, areas_m2)| areas_m2).sum(),
+            on_grid_m2: whole.cells().sum(),
             on_grid: RegionOnGrid {
                 addresses: [weights.all.clone(), weights.ocean.clone()],
                 whole,

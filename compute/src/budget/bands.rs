@@ -42,16 +42,16 @@ fn rows(grid: &Grid, chunk: u32) -> Option<(impl Iterator<Item = usize>, usize)>
 }
 
 /// Area of all sea in every band, m² in steps of 10⁻⁶, of the chunks of a region's sea.
-pub fn band_areas<'a>(
+pub fn band_areas(
     grid: &Grid,
-    chunks: impl Iterator<Item = (u32, &'a [f64])>,
+    chunks: impl Iterator<Item = (u32, impl AsRef<[f64]>)>,
 ) -> Result<[i128; BAND_COUNT], OutOfRange> {
     let mut areas = [0; BAND_COUNT];
     for (chunk, area_m2) in chunks {
         let Some((bands, cols)) = rows(grid, chunk) else {
             continue;
         };
-        for (band, area_m2) in bands.zip(area_m2.chunks(cols)) {
+        for (band, area_m2) in bands.zip(area_m2.as_ref().chunks(cols)) {
             areas[band] += total_area_steps(area_m2)?;
         }
     }

@@ -31,8 +31,7 @@ pub(super) fn unit_of_largest(weights: &RegionWeights) -> WeightUnit {
 }
 
 fn largest(weights: &RegionWeights) -> f64 {
-    let all = weights.chunks().flat_map(|(_chunk, weights)| weights);
-    all.copied().fold(f64::MIN_POSITIVE, f64::max)
+    weights.cells().fold(f64::MIN_POSITIVE, f64::max)
 }
 
 /// Weight of a cell, in steps.
@@ -156,12 +155,17 @@ impl Cells<'_> {
         let windows = chunks(self.shape);
         for (chunk, weights) in self.whole.chunks() {
             let window = windows[chunk as usize];
-            let rows = weights.chunks_exact(window.cols as usize);
-            for (row, weights) in (window.row..).zip(rows) {
+            let cols = window.cols as usize;
+            for (row, row_start) in (window.row..).zip((0..window.cell_count()).step_by(cols)) {
                 let first = row as usize / BLOCK_CELLS as usize * across as usize;
-                for (col, _) in (window.col..).zip(weights).filter(|(_, w)| **w > 0.0) {
-                    let block = first + (col / BLOCK_CELLS) as usize;
-                    held[block / WORD_BITS] |= 1 << (block % WORD_BITS);
+                let weights = weights.runs(row_start..row_start + cols);
+                for (cells, _) in weights.filter(|(_, weight)| *weight > 0.0) {
+                    let [west, east] = [cells.start, cells.end - 1].map(|cell| {
+                        first + (window.col as usize + cell - row_start) / BLOCK_CELLS as usize
+                    });
+                    for block in west..=east {
+                        held[block / WORD_BITS] |= 1 << (block % WORD_BITS);
+                    }
                 }
             }
         }

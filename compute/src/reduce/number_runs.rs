@@ -20,7 +20,11 @@ pub(super) fn serialize<S: Serializer>(numbers: &[u32], to: S) -> Result<S::Ok, 
 ///
 /// # Errors
 /// They are too many, or beyond what a number holds.
-pub(super) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<u32>, D::Error> {
+pub(super) fn deserialize<'de, D, N>(from: D) -> Result<N, D::Error>
+where
+    D: Deserializer<'de>,
+    N: FromIterator<u32>,
+{
     let runs: Vec<(u32, u32)> = Vec::deserialize(from)?;
     let count: u64 = runs.iter().map(|(_, count)| u64::from(*count)).sum();
     let is_inside = |(first, count): &(u32, u32)| first.checked_add(*count).is_some();

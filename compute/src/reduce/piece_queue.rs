@@ -27,17 +27,22 @@ impl<R> Reduce for R where
 {
 }
 
-/// Pieces that nobody works on yet.
-struct PieceQueue(Mutex<std::vec::IntoIter<Piece>>);
+/// Pieces that nobody works on yet, those of large maps cut when their turn comes.
+struct PieceQueue(Mutex<Box<dyn Iterator<Item = Piece> + Send>>);
 
 impl PieceQueue {
+    fn of(pieces: Vec<Piece>) -> Self {
+        let pieces = pieces.into_iter().flat_map(Piece::cut);
+        Self(Mutex::new(Box::new(pieces)))
+    }
+
     fn next(&self) -> Option<Piece> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).next()
     }
 
     /// Nobody needs what is left.
     fn clear(&self) {
-        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = vec![].into_iter();
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = Box::new(iter::empty());
     }
 
     async fn work_off(&self, reduce: &impl Reduce) -> Result<Accumulated, ComputeError> {
@@ -81,8 +86,9 @@ async fn reduced_on(
     pieces: Vec<Piece>,
     at_once: usize,
 ) -> Result<Accumulated, ComputeError> {
-    let thread_count = at_once.clamp(1, pieces.len().max(1));
-    let queue = Arc::new(PieceQueue(Mutex::new(pieces.into_iter())));
+    let piece_count: usize = pieces.iter().map(Piece::cut_count).sum();
+    let thread_count = at_once.clamp(1, piece_count.max(1));
+    let queue = Arc::new(PieceQueue::of(pieces));
     let awaited = Awaited(Arc::clone(&queue));
     // One is waited for, so that every question has its turn, and no more: who waits holds nothing that others wait for.
     let first = free.acquire().await.expect("nobody closes it");
@@ -132,11 +138,11 @@ mod tests {
     fn pieces(count: u32) -> Vec<Piece> {
         let piece = |number: u32| Piece {
             key: ObjectKey::field(&"p".parse().unwrap(), &Digest::of(&number.to_le_bytes())),
-            address: String::new(),
+            address: "".into(),
             layout: Layout::Blocks,
             first_step: number,
             steps: 0..1,
-            rows: vec![],
+            rows: [].into(),
             inside: vec![],
         };
         (0..count).map(piece).collect()
@@ -215,7 +221,7 @@ mod tests {
                 _ => Ok(sums_of(&piece, 1)),
             }
         };
-        let queue = PieceQueue(Mutex::new(pieces(10).into_iter()));
+        let queue = PieceQueue::of(pieces(10));
         let told = queue.work_off(&third_fails).await.unwrap_err();
         assert!(told.to_string().contains("cannot be read"), "{told}");
         assert_eq!(begun.load(Ordering::SeqCst), 3);
@@ -240,9 +246,7 @@ mod tests {
 
     #[tokio::test]
     async fn sums_that_leave_their_range_are_an_error_and_end_it_too() {
-        let queue = PieceQueue(Mutex::new(
-            [pieces(1), pieces(1), pieces(1)].concat().into_iter(),
-        ));
+        let queue = PieceQueue::of([pieces(1), pieces(1), pieces(1)].concat());
         let reduce = async |piece: Piece| Ok(sums_of(&piece, i128::MAX));
         assert!(queue.work_off(&reduce).await.is_err());
         assert!(queue.next().is_none(), "the rest is worked on");

@@ -18,8 +18,13 @@ use serde::{Deserialize, Serialize};
 use super::cells::Shape;
 use super::histogram::Buckets;
 use super::inside::InsideRun;
+use super::region_sums::CellArea;
 use crate::budget::Measure;
 
+/// Values that a piece holds at once, bytes before compression.
+pub(super) const PIECE_BYTES: u64 = 8 << 20;
+/// Chunks of a field that are so much: a third of a map of 1/10 degree.
+const CHUNKS_AT_ONCE: usize = (PIECE_BYTES / CHUNK_BYTES) as usize;
 /// What it costs to open one more file, in bytes read.
 pub(super) const OPEN_BYTES: u64 = 64 << 10;
 /// Bytes of a record of sums, before compression.
@@ -27,6 +32,10 @@ pub(super) const RECORD_BYTES: u64 = 6 << 10;
 /// Bytes of a chunk of a field, before compression.
 pub(super) const CHUNK_BYTES: u64 = CHUNK_ROWS as u64 * CHUNK_COLS as u64 * VALUE_BYTES;
 const VALUE_BYTES: u64 = size_of::<f32>() as u64;
+
+/// Bytes of what the cells of a block have of a geometry: in a short run of steps more than their values.
+pub(super) const SHARES_BYTES: u64 =
+    BLOCK_CELLS as u64 * BLOCK_CELLS as u64 * size_of::<CellArea>() as u64;
 
 /// Bytes of a block in a run of so many steps, before compression.
 pub(super) fn block_bytes(steps: u64) -> u64 {
@@ -120,7 +129,7 @@ pub(super) struct Piece {
     /// Name of the object; of blocks that of the field of their first step.
     pub(super) key: ObjectKey,
     /// Where queries read it; nowhere in particular if it is read along time.
-    pub(super) address: String,
+    pub(super) address: Arc<str>,
     pub(super) layout: Layout,
     /// Index of its first step in the version.
     pub(super) first_step: u32,
@@ -128,7 +137,7 @@ pub(super) struct Piece {
     pub(super) steps: Range<u32>,
     /// Numbers of blocks or chunks, increasing.
     #[serde(with = "super::number_runs")]
-    pub(super) rows: Vec<u32>,
+    pub(super) rows: Arc<[u32]>,
     /// Blocks whose stored sums are read.
     pub(super) inside: Vec<InsideRun>,
 }
@@ -144,6 +153,26 @@ impl Piece {
                 records.sum::<usize>() as u64 * RECORD_BYTES
             }
             Layout::Field(_) => self.rows.len() as u64 * CHUNK_BYTES + OPEN_BYTES,
+        }
+    }
+
+    /// The same in pieces of which none holds more than [`PIECE_BYTES`] of a field at once, however large its grid is.
+    pub(super) fn cut(self) -> Vec<Self> {
+        if self.cut_count() == 1 {
+            return vec![self];
+        }
+        let own = |chunks: &[u32]| Self {
+            rows: chunks.into(),
+            ..self.clone()
+        };
+        self.rows.chunks(CHUNKS_AT_ONCE).map(own).collect()
+    }
+
+    /// How many pieces those are.
+    pub(super) fn cut_count(&self) -> usize {
+        match self.layout {
+            Layout::Field(_) => self.rows.len().div_ceil(CHUNKS_AT_ONCE).max(1),
+            Layout::Blocks | Layout::Sums => 1,
         }
     }
 
@@ -164,4 +193,42 @@ pub(super) enum Layout {
     Sums,
     /// A row a chunk of one step.
     Field(Period),
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn piece(layout: Layout, rows: u32) -> Piece {
+        Piece {
+            key: ObjectKey::field(&"p".parse().unwrap(), &Digest::of(b"")),
+            address: "".into(),
+            layout,
+            first_step: 3,
+            steps: 0..1,
+            rows: (0..rows).map(|row| 2 * row).collect(),
+            inside: vec![],
+        }
+    }
+
+    #[test]
+    fn every_chunk_of_a_field_is_in_one_cut_and_no_cut_is_larger_than_a_piece() {
+        let month = Layout::Field(Period::month(2001, 1).unwrap());
+        let most = CHUNKS_AT_ONCE as u32;
+        for (count, wanted) in [(0, 1), (1, 1), (most, 1), (most + 1, 2), (3 * most + 7, 4)] {
+            let whole = piece(month, count);
+            assert_eq!(whole.cut_count(), wanted);
+            let cuts = whole.clone().cut();
+            assert_eq!(cuts.len(), wanted);
+            for cut in &cuts {
+                assert!(cut.cost_bytes() <= PIECE_BYTES + OPEN_BYTES, "{count}");
+                assert_eq!((&cut.key, cut.layout), (&whole.key, whole.layout));
+                assert_eq!(cut.of_version(), whole.of_version());
+            }
+            let rows = cuts.iter().flat_map(|cut| cut.rows.iter().copied());
+            assert!(rows.eq(whole.rows.iter().copied()), "{count}");
+        }
+        // What is read along time was cut when it was planned.
+        assert_eq!(piece(Layout::Blocks, 3 * most).cut().len(), 1);
+    }
 }

@@ -12,12 +12,15 @@ use datafusion::arrow::array::{Array as _, AsArray as _, RecordBatch};
 
 use super::accumulator::Accumulated;
 use super::piece_queue;
-use super::question::{Piece, Question};
+use super::question::{PIECE_BYTES, Piece, Question};
 use super::task::{Task, Worker};
-use super::tasks::PIECE_BYTES;
 use crate::scan;
 use crate::session::QueryContext;
 use crate::{ComputeError, Engine};
+
+/// Most pieces that those of large maps are cut into when they are dealt out: each is some hundred bytes of a query. Of more, which are many
+/// steps, whole maps are dealt out, and whoever reads them cuts them.
+const MOST_CUTS: usize = 1 << 12;
 
 /// What some pieces of a question come to. None where executors did not find along time what these pieces were planned for: the
 /// question is to be asked of fields then.
@@ -79,6 +82,12 @@ async fn distributed(
 ) -> Result<Option<Accumulated>, ComputeError> {
     let keys: BTreeSet<ObjectKey> = pieces.iter().map(|piece| piece.key.clone()).collect();
     let keys: Vec<&ObjectKey> = keys.iter().collect();
+    let cut_count: usize = pieces.iter().map(Piece::cut_count).sum();
+    let pieces = if cut_count <= MOST_CUTS {
+        pieces.into_iter().flat_map(Piece::cut).collect()
+    } else {
+        pieces
+    };
     let all = Task { question, pieces };
     // A cluster's scheduler knows its executors, and deals pieces out to them when it plans.
     let tasks = if engine.has_dealer() {

@@ -1,7 +1,7 @@
 //! A piece of a question: some blocks of a run of steps, or chunks of a field, read, reduced and forgotten.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use contract::chunk::Window;
 use cube::{BLOCK_CELLS, EncodedBlocks, EncodedSums, RUN_STEPS, Undecoded};
@@ -145,6 +145,8 @@ pub(super) struct Worker {
     shares: Arc<RememberedShares>,
     /// The version along time, where it was opened.
     values: Option<cube::Values>,
+    /// Chunks of fields, once the first of them is read.
+    windows: Arc<OnceLock<Vec<Window>>>,
 }
 
 impl Worker {
@@ -164,6 +166,7 @@ impl Worker {
             objects: objects.clone(),
             question: Arc::new(question),
             values,
+            windows: Arc::default(),
         })
     }
 
@@ -194,11 +197,11 @@ impl Worker {
             return Err(ComputeError::inconsistent(piece.key.as_str(), NOT_OPENED));
         };
         let index = self.objects.row_index(stored).await?;
-        let fetched = storage::rows::fetch(stored, index, piece.rows.clone()).await?;
-        let windows = cells::chunks(self.question.shape);
-        let expected = windows.clone();
-        self.reduced(piece, &windows, |take| {
-            fetched.each(|row| fields::expected(&expected, row, period), take)
+        let fetched = storage::rows::fetch(stored, index, piece.rows.to_vec()).await?;
+        let shape = self.question.shape;
+        let windows = self.windows.get_or_init(|| cells::chunks(shape));
+        self.reduced(piece, windows, |take| {
+            fetched.each(|row| fields::expected(windows, row, period), take)
         })
     }
 

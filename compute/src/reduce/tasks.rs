@@ -12,10 +12,10 @@ use storage::Store;
 
 use super::cells::Cells;
 use super::inside::{Inside, InsideRun};
-use super::question::{CHUNK_BYTES, Layout, OPEN_BYTES, Piece, RECORD_BYTES, block_bytes};
+use super::question::{
+    CHUNK_BYTES, Layout, OPEN_BYTES, PIECE_BYTES, Piece, RECORD_BYTES, SHARES_BYTES, block_bytes,
+};
 
-/// Values that a piece holds at once, bytes before compression.
-pub(super) const PIECE_BYTES: u64 = 8 << 20;
 /// Runs of blocks whose sums a piece holds at once: some of each piece of the region.
 const SUMS_AT_ONCE: usize = 512;
 
@@ -47,8 +47,7 @@ impl Version<'_> {
         cells: &Cells<'_>,
         stored: Option<Scale>,
     ) -> Vec<Run> {
-        let mut parts = Parts::new(cells, stored);
-        let chunks: Vec<u32> = cells.whole.chunks().map(|(chunk, _)| chunk).collect();
+        let chunks = chunks(cells);
         let fields = |steps: Range<u32>| Run {
             name: None,
             pieces: self.fields(steps.clone(), &chunks).collect(),
@@ -57,12 +56,15 @@ impl Version<'_> {
         let time_major = self.values.map(Values::time_major).unwrap_or_default();
         let mut runs = vec![];
         let mut next = steps.start;
+        // Of a large grid its blocks are millions: who reads fields alone needs none of them.
+        let mut parts = None;
         for run in time_major {
             let run = run.start as u32..run.end as u32;
             let wanted = steps.start.max(run.start)..steps.end.min(run.end);
             if wanted.is_empty() {
                 continue;
             }
+            let parts = parts.get_or_insert_with(|| Parts::new(cells, stored));
             let inside = parts.of(self
                 .values
                 .and_then(|values| values.summed_as(&(run.start as usize..run.end as usize))));
@@ -89,14 +91,15 @@ impl Version<'_> {
     fn pieces(&self, run: &Range<u32>, inside: &Inside) -> Vec<Piece> {
         let piece = |layout: Layout, rows: &[u32], inside: &[InsideRun]| Piece {
             key: self.manifest.steps[run.start as usize].field.clone(),
-            address: String::new(),
+            address: "".into(),
             layout,
             first_step: run.start,
             steps: 0..run.end - run.start,
-            rows: rows.to_vec(),
+            rows: rows.into(),
             inside: inside.to_vec(),
         };
-        let at_once = (PIECE_BYTES / block_bytes(run.len() as u64)).max(1) as usize;
+        let each = block_bytes(run.len() as u64).max(SHARES_BYTES);
+        let at_once = (PIECE_BYTES / each).max(1) as usize;
         let blocks = inside.rim.chunks(at_once);
         let blocks = blocks.map(|rows| piece(Layout::Blocks, rows, &[]));
         let sums = inside.runs.chunks(SUMS_AT_ONCE);
@@ -110,28 +113,32 @@ impl Version<'_> {
         steps: impl Iterator<Item = u32>,
         cells: &Cells<'_>,
     ) -> Vec<Piece> {
-        let chunks: Vec<u32> = cells.whole.chunks().map(|(chunk, _)| chunk).collect();
-        self.fields(steps, &chunks).collect()
+        self.fields(steps, &chunks(cells)).collect()
     }
 
     fn fields(
         &self,
         steps: impl Iterator<Item = u32>,
-        chunks: &[u32],
+        chunks: &Arc<[u32]>,
     ) -> impl Iterator<Item = Piece> {
         steps.map(move |at| {
             let step = &self.manifest.steps[at as usize];
             Piece {
                 key: step.field.clone(),
-                address: self.store.sql_url(&step.field).to_string(),
+                address: self.store.sql_url(&step.field).to_string().into(),
                 layout: Layout::Field(step.period),
                 first_step: at,
                 steps: 0..1,
-                rows: chunks.to_vec(),
+                rows: Arc::clone(chunks),
                 inside: vec![],
             }
         })
     }
+}
+
+/// The chunks of a geometry: every step has the same ones.
+fn chunks(cells: &Cells<'_>) -> Arc<[u32]> {
+    cells.whole.chunks().map(|(chunk, _)| chunk).collect()
 }
 
 /// A geometry's blocks, parted by the sums that are stored: mostly the same for all runs of steps.

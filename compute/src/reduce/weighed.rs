@@ -170,7 +170,7 @@ impl Weighed {
 }
 
 fn total(weights: &RegionWeights) -> f64 {
-    weights.chunks().flat_map(|(_chunk, own)| own).sum()
+    weights.cells().sum()
 }
 
 async fn loaded(engine: &Engine, address: &str) -> Result<Arc<RegionWeights>, ComputeError> {

@@ -4,8 +4,8 @@ use storage::weights::{SharedAreas, Sharing};
 
 use crate::ComputeError;
 
-/// Most memory that areas of one region may take, bytes, equal chunks counted once: what the coasts of a grid of 1/60 degree need
-/// several times.
+/// Most memory that areas of one region may take, bytes, equal neighbours and equal chunks counted once: a hundred times what the coasts of a
+/// grid of 1/100 degree need.
 const MAX_AREA_BYTES: u64 = 2 << 30;
 
 /// Chunks with any area.

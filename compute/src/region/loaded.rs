@@ -14,7 +14,7 @@ use storage::weights::SharedAreas;
 
 use crate::ComputeError;
 
-/// Weights held, bytes: those of the whole 1/60-degree China Sea take 35 MB. Larger ones are read anew by each task.
+/// Weights held, bytes: those of the globe's sea in cells of 1/100 degree take 22 MB. Larger ones are read anew by each task.
 const HELD_BYTES: u64 = 256 << 20;
 /// Regions held, a guess that sizes tables. For so few the cache is one shard: in several, each would have a part of the room
 /// that large weights do not fit into.
@@ -42,18 +42,21 @@ impl RegionWeights {
     }
 
     /// Areas of the cells of a chunk; none where the region does not touch it.
-    pub(crate) fn areas_m2(&self, chunk: u32) -> Option<&[f64]> {
+    fn areas_m2(&self, chunk: u32) -> Option<&SharedAreas> {
         let at = self
             .chunks
             .binary_search_by_key(&chunk, |(chunk, _)| *chunk);
-        at.ok().map(|at| &self.chunks[at].1[..])
+        at.ok().map(|at| &self.chunks[at].1)
     }
 
     /// Areas of the cells of every chunk that the region touches, with its number.
-    pub(crate) fn chunks(&self) -> impl Iterator<Item = (u32, &[f64])> {
-        self.chunks
-            .iter()
-            .map(|(chunk, areas)| (*chunk, &areas[..]))
+    pub(crate) fn chunks(&self) -> impl Iterator<Item = (u32, &SharedAreas)> {
+        self.chunks.iter().map(|(chunk, areas)| (*chunk, areas))
+    }
+
+    /// All areas, cell by cell in the order of chunks.
+    pub(crate) fn cells(&self) -> impl Iterator<Item = f64> {
+        self.chunks.iter().flat_map(|(_chunk, areas)| areas.iter())
     }
 
     /// Hands over the column and the weight of the cells of a run of a row that lie in chunks which the geometry touches, eastwards;
@@ -73,9 +76,11 @@ impl RegionWeights {
             let run_end = cols.end.min(chunk_end);
             if let Some(areas) = self.areas_m2(row / CHUNK_ROWS * chunks_across + across) {
                 let width = chunk_end - across * CHUNK_COLS;
-                let at = (row % CHUNK_ROWS) * width + col % CHUNK_COLS;
-                for (col, area) in (col..run_end).zip(&areas[at as usize..]) {
-                    take(col, *area);
+                let at = ((row % CHUNK_ROWS) * width + col % CHUNK_COLS) as usize;
+                for (cells, area) in areas.runs(at..at + (run_end - col) as usize) {
+                    for cell in cells {
+                        take(col + (cell - at) as u32, area);
+                    }
                 }
             }
             col = run_end;
@@ -84,13 +89,11 @@ impl RegionWeights {
 
     fn size_bytes(&self) -> u64 {
         // Those that several chunks share are held once.
-        let distinct: BTreeMap<*const f64, usize> = self
-            .chunks
-            .iter()
-            .map(|(_, areas)| (areas.as_ptr(), areas.len()))
-            .collect();
-        let areas = distinct.values().sum::<usize>() * size_of::<f64>();
-        (areas + self.chunks.len() * size_of::<(u32, SharedAreas)>()) as u64
+        let own = self.chunks.iter();
+        let own = own.map(|(_, areas)| (areas.address(), areas.size_bytes()));
+        let distinct: BTreeMap<usize, u64> = own.collect();
+        let areas = distinct.values().sum::<u64>();
+        areas + (self.chunks.len() * size_of::<(u32, SharedAreas)>()) as u64
     }
 }
 
@@ -157,7 +160,7 @@ mod tests {
     #[test]
     fn a_chunk_that_is_not_touched_has_no_areas() {
         let weights = RegionWeights::new(vec![(7, vec![1.0]), (3, vec![2.0, 0.5])]);
-        assert_eq!(weights.areas_m2(3), Some(&[2.0, 0.5][..]));
+        assert_eq!(weights.areas_m2(3), Some(&vec![2.0, 0.5].into()));
         assert_eq!(weights.areas_m2(5), None);
     }
 
@@ -177,8 +180,11 @@ mod tests {
     #[tokio::test]
     async fn weights_that_take_most_of_the_room_are_held() {
         let loaded = LoadedWeights::default();
-        let areas = vec![0.0; HELD_BYTES as usize * 9 / 10 / size_of::<f64>()];
-        let read = async { Ok(RegionWeights::new(vec![(1, areas)])) };
+        // Each its own, or they took nothing.
+        let areas = (0..HELD_BYTES as usize * 9 / 10 / size_of::<f64>()).map(|cell| cell as f64);
+        let weights = RegionWeights::new(vec![(1, areas.collect::<Vec<f64>>())]);
+        assert!(weights.size_bytes() > HELD_BYTES * 8 / 10);
+        let read = async { Ok(weights) };
         loaded.get("large", read).await.unwrap();
         let never = async { panic!("read again") };
         assert!(loaded.get("large", never).await.is_ok());

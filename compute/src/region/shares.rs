@@ -250,11 +250,11 @@ mod tests {
         };
         let weigh = |of, values: &[f32]| shares(of).weigh(&GRID, &areas, values);
         assert_eq!(
-            weigh(Of::Sea, &values).unwrap()[0].1[3].to_bits(),
+            weigh(Of::Sea, &values).unwrap()[0].1.to_vec()[3].to_bits(),
             25.0f64.to_bits()
         );
         assert_eq!(
-            weigh(Of::Land, &values).unwrap()[0].1[3].to_bits(),
+            weigh(Of::Land, &values).unwrap()[0].1.to_vec()[3].to_bits(),
             75.0f64.to_bits()
         );
         values[7] = f32::NAN;

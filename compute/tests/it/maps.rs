@@ -605,6 +605,82 @@ async fn memory_changes_no_bit_and_what_it_cannot_hold_is_refused() {
     assert!(refused.to_string().contains("--memory-mib"), "{refused}");
 }
 
+/// Of more rows than two bands have, and no whole number of chunks or blocks.
+const HIGH: Grid = Grid {
+    rows: 277,
+    cols: 125,
+    north_deg: 69.25,
+    west_deg: -30.0,
+    dlat_deg: 0.5,
+    dlon_deg: 0.5,
+};
+
+#[tokio::test(flavor = "multi_thread")]
+async fn maps_that_have_no_room_are_made_in_bands_of_rows_and_are_the_same_objects() {
+    let (_folder, store) = folder_store();
+    let value = |month: usize, cell: usize| match (cell * 7919 + month) % 11 {
+        3 => f32::NAN,
+        own => (own + cell % 1009) as f32 * 0.01 + (month % 12) as f32,
+    };
+    let step = |month: usize| {
+        let period = Period::month(2001 + (month / 12) as i32, month as u32 % 12 + 1).unwrap();
+        let cells = 0..HIGH.cell_count();
+        (period, cells.map(|cell| value(month, cell)).collect())
+    };
+    let steps: Vec<(Period, Vec<f32>)> = (0..24).map(step).collect();
+    land(&store, &product("wind"), Quantity::WindSpeed, HIGH, &steps).await;
+    let roomy = Engine::in_process(store.clone(), parts(2));
+    // Of 13 maps 120 rows at a time have room, and not 240.
+    let small = roomy.clone().with_memory_bytes(3 << 20);
+    for (number, (region, crop)) in [
+        (None, false),
+        (Some("-20,-60,15,55"), false),
+        (Some("-20,-60,15,55"), true),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let options = |name: &str| {
+            let of = |statistic| MapOptions {
+                crop,
+                ..of(statistic, region, &format!("{name}-{number}-{statistic}"))
+            };
+            [MapStatistic::Climatology, MapStatistic::Mean].map(of)
+        };
+        let wind = product("wind");
+        let [made, other] = [(&roomy, "roomy"), (&small, "small")].map(|(engine, name)| {
+            let (wind, options) = (wind.clone(), options(name));
+            async move {
+                derive_statistics(engine, &wind, &options, &|_| ())
+                    .await
+                    .unwrap()
+            }
+        });
+        for (made, other) in made.await.iter().zip(&other.await) {
+            assert!(made.grid.rows > 120, "it is made at once");
+            assert_eq!((made.grid, made.quantity), (other.grid, other.quantity));
+            let digest = |key: &contract::key::ObjectKey| {
+                key.as_str().rsplit('/').next().unwrap().to_owned()
+            };
+            assert_eq!(digest(&made.domain), digest(&other.domain));
+            assert_eq!(made.steps.len(), other.steps.len());
+            for (step, other) in made.steps.iter().zip(&other.steps) {
+                assert_eq!(digest(&step.field), digest(&other.field));
+                assert_eq!(step.valid_cells, other.valid_cells);
+                assert_eq!(step.period, other.period);
+            }
+        }
+    }
+    // Anomalies are less the maps of all cells.
+    let tiny = roomy.with_memory_bytes(1 << 20);
+    for statistic in [MapStatistic::Anomaly, MapStatistic::Climatology] {
+        let refused = derived(&tiny, &of(statistic, None, "tiny"))
+            .await
+            .unwrap_err();
+        assert!(refused.to_string().contains("--memory-mib"), "{refused}");
+    }
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn anomalies_have_the_same_bits_from_blocks_and_from_fields() {
     let (_folder, store) = folder_store();

@@ -1,11 +1,25 @@
 //! The same bits however many parts a budget is computed in, and in whatever order files are read.
 
-use compute::Engine;
+use std::sync::Arc;
+
+use compute::budget::chunk::mass_steps;
+use compute::budget::fixed::{MASS_DECIMALS, decimal_text};
+use compute::reduce::statistics;
+use compute::region::weights;
+use compute::{Engine, Objects};
 use contract::budget::BudgetQuery;
+use contract::chunk::field_chunks;
+use contract::earth::Earth;
+use contract::grid::Grid;
 use contract::quantity::Quantity;
+use contract::region::Region;
+use contract::statistics::StatisticsQuery;
 use contract::time::{Period, TimeStep};
+use object_store::ObjectStore;
 
 use crate::fixture::{ONE_DEGREE, ask, folder_store, land, parts, product, total, wavy_year};
+use crate::reading::{Counting, random_flux};
+use crate::statistics::{area, asked};
 
 #[tokio::test(flavor = "multi_thread")]
 async fn any_number_of_partitions_gives_the_same_bits_with_ballista_and_without() {
@@ -90,4 +104,59 @@ fn float_sum<'a>(steps: impl Iterator<Item = &'a [f32]>) -> u32 {
         .map(|value| value * 1e10)
         .sum::<f32>()
         .to_bits()
+}
+
+/// A map of 25 x 25 chunks.
+const MANY_CHUNKS: Grid = Grid {
+    rows: 1500,
+    cols: 3000,
+    north_deg: 90.0,
+    west_deg: -180.0,
+    dlat_deg: 0.12,
+    dlon_deg: 0.12,
+};
+/// Most bytes of values that are read together, and of their checks.
+const PIECE_BYTES: u64 = (8 << 20) + (64 << 10);
+
+#[tokio::test(flavor = "multi_thread")]
+async fn no_more_of_a_large_map_is_held_than_a_piece_and_all_of_it_is_summed() {
+    let (_folder, store) = folder_store();
+    let id = product("flux");
+    let mut next = random_flux();
+    let values: Vec<f32> = (0..MANY_CHUNKS.cell_count()).map(|_cell| next()).collect();
+    let month = Period::month(2001, 1).unwrap();
+    let steps = [(month, values.clone())];
+    let flux = Quantity::CarbonFlux;
+    let manifest = land(&store, &id, flux, MANY_CHUNKS, &steps).await;
+    let field_bytes = store.size_bytes(&manifest.steps[0].field).await.unwrap();
+    assert!(field_bytes > PIECE_BYTES, "the map is no large one");
+
+    let (windows, seconds) = (field_chunks(&MANY_CHUNKS), month.seconds());
+    let mut expected = 0;
+    for (chunk, areas_m2) in weights::compute(&MANY_CHUNKS, &Region::Global, Earth::Wgs84).unwrap()
+    {
+        let cells = windows[chunk as usize].cell_indices(&MANY_CHUNKS);
+        let own: Vec<f32> = cells.map(|cell| values[cell]).collect();
+        expected += mass_steps(&own, &areas_m2, seconds).unwrap();
+    }
+    let means = StatisticsQuery {
+        product: id.clone(),
+        ..asked(area("global"), "mean,median,coverage", TimeStep::Total)
+    };
+    let mut answers = vec![];
+    for count in [1, 4] {
+        let (root, inner) = store.sql_root();
+        let counting = Arc::new(Counting::of(inner));
+        let objects = Objects::new(root, Arc::clone(&counting) as Arc<dyn ObjectStore>);
+        let engine = Engine::in_process(store.clone(), parts(count)).reading(objects);
+        let budget = ask(&engine, &total(&id, "global")).await;
+        assert_eq!(
+            budget.rows[0].budget_kg,
+            decimal_text(expected, MASS_DECIMALS)
+        );
+        answers.push(statistics(&engine, &means).await.unwrap().rows);
+        let most = counting.most_bytes();
+        assert!(most <= PIECE_BYTES, "{most} of {field_bytes} bytes at once");
+    }
+    assert!(same(&answers), "{answers:#?}");
 }

@@ -44,6 +44,7 @@ pub(crate) struct Counting {
     folder: &'static str,
     bytes: AtomicU64,
     requests: AtomicU64,
+    most: AtomicU64,
 }
 
 impl Counting {
@@ -58,6 +59,7 @@ impl Counting {
             folder,
             bytes: AtomicU64::new(0),
             requests: AtomicU64::new(0),
+            most: AtomicU64::new(0),
         }
     }
 
@@ -69,8 +71,14 @@ impl Counting {
         self.requests.load(Ordering::Relaxed)
     }
 
+    /// Bytes of the largest request.
+    pub(crate) fn most_bytes(&self) -> u64 {
+        self.most.load(Ordering::Relaxed)
+    }
+
     fn count(&self, at: &Path, bytes: u64) {
         if at.as_ref().contains(self.folder) {
+            self.most.fetch_max(bytes, Ordering::Relaxed);
             self.bytes.fetch_add(bytes, Ordering::Relaxed);
             self.requests.fetch_add(1, Ordering::Relaxed);
         }

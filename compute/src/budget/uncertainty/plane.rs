@@ -47,7 +47,7 @@ impl Window {
         let windows = field_chunks(grid);
         for (chunk, areas_m2) in weights.chunks() {
             let cells = windows[chunk as usize].cell_indices(grid);
-            for (cell, _) in cells.zip(areas_m2).filter(|(_, area)| **area > 0.0) {
+            for (cell, _) in cells.zip(areas_m2.iter()).filter(|(_, area)| *area > 0.0) {
                 has_row[cell / cols] = true;
                 has_col[cell % cols] = true;
             }

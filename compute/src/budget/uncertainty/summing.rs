@@ -111,8 +111,8 @@ pub(super) fn weighed(
     let windows = field_chunks(grid);
     for (part, (chunk, areas_m2)) in region.chunks().enumerate() {
         let cells = windows[chunk as usize].cell_indices(grid);
-        let cells = cells.zip(areas_m2).enumerate();
-        for (at, (cell, area_m2)) in cells.filter(|(_, (_, area))| **area > 0.0) {
+        let cells = cells.zip(areas_m2.iter()).enumerate();
+        for (at, (cell, area_m2)) in cells.filter(|(_, (_, area))| *area > 0.0) {
             let flux = f64::from(values[part][at]);
             if flux.is_nan() {
                 continue;

@@ -12,7 +12,9 @@ use storage::{StorageError, fields};
 
 use super::super::{DeriveProgress, Progress};
 use super::blocks::Blocks;
-use super::landed::{Computed, Found, Landing};
+use super::computed::Computed;
+use super::found::Found;
+use super::landed::Landing;
 use super::means::{MeanOf, Sum};
 use super::plan::Output;
 use super::runs::{AnomaliesOf, Less, MadeRun, OfAnomalies, Runs};
@@ -36,7 +38,8 @@ impl Landing<'_> {
         progress: &Progress<'_>,
     ) -> Result<Made, ComputeError> {
         let (plan, source, engine) = (self.plan, self.sources.first, self.engine);
-        let blocks = Arc::new(Blocks::of(engine, &source.grid, self.wanted, self.stored));
+        let stored = (self.stored, &(0..self.stored.grid.rows));
+        let blocks = Arc::new(Blocks::of(engine, &source.grid, self.wanted, stored));
         let of = if let Some(held) = computed.held {
             AnomaliesOf::Held(Arc::new(held))
         } else {
@@ -46,7 +49,7 @@ impl Landing<'_> {
                 stored: *self.stored,
                 of: Arc::clone(&plan.anomalies_of),
                 bins: plan.outputs.iter().map(bin).collect(),
-                normals: computed.maps,
+                normals: computed.maps.held()?,
                 factor: plan.factor,
             });
             if !blocks.are_held_in_runs() {
@@ -111,7 +114,7 @@ impl Landing<'_> {
         drop(landing);
         found.merge(&of_steps);
         at_hand.checks = checks;
-        self.manifest(steps, &found).await
+        self.manifest(steps, found).await
     }
 
     /// Anomalies of whole fields: where there is no memory for runs of steps.
@@ -139,7 +142,7 @@ impl Landing<'_> {
             progress(self.done(steps.len()));
         }
         drop(landing);
-        self.manifest(steps, &found).await
+        self.manifest(steps, found).await
     }
 
     /// What the steps of a mean come to in every cell that is stored.
@@ -169,7 +172,7 @@ impl Landing<'_> {
         let making = move || {
             let values = values();
             let mut found = Found::nothing(cells);
-            found.add(&values);
+            found.add(0, &values);
             Ok::<_, StorageError>((fields::encode(&grid, &values, period)?, found))
         };
         let made = tokio::task::spawn_blocking(making).await;

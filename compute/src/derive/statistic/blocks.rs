@@ -84,9 +84,22 @@ impl<'a> Groups<'a> {
 }
 
 impl Blocks {
-    /// Those of a grid, in the order in which they are stored.
-    pub(super) fn of(engine: &Engine, grid: &Grid, wanted: &Wanted, stored: &Stored) -> Self {
-        let mut windows = windows(grid, BLOCK_CELLS, BLOCK_CELLS);
+    /// Those of a grid that are in some rows of what is stored, which begin with a block, in the order in which they are stored.
+    pub(super) fn of(
+        engine: &Engine,
+        grid: &Grid,
+        wanted: &Wanted,
+        (stored, rows): (&Stored, &Range<u32>),
+    ) -> Self {
+        let rows = stored.source_rows(rows);
+        let of_rows = Grid {
+            rows: rows.end - rows.start,
+            ..*grid
+        };
+        let mut windows = windows(&of_rows, BLOCK_CELLS, BLOCK_CELLS);
+        for window in &mut windows {
+            window.row += rows.start;
+        }
         windows.retain(|window| wanted.is_any_of(grid, *window));
         windows.sort_by_key(|window| stored.block(window));
         Self {

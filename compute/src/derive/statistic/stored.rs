@@ -1,5 +1,7 @@
 //! Which cells of a grid the product of a statistic has: all of its source's, or those about a region.
 
+use std::ops::Range;
+
 use contract::ContractError;
 use contract::analysis::MapOptions;
 use contract::chunk::{Window, windows};
@@ -51,6 +53,11 @@ impl Stored {
             part,
             grid: part.grid(source),
         }
+    }
+
+    /// Rows of the source that some rows of the product are.
+    pub(super) fn source_rows(&self, rows: &Range<u32>) -> Range<u32> {
+        self.part.row + rows.start..self.part.row + rows.end
     }
 
     /// Where in the product a block of the source lies that has any stored cell: row and column of blocks.
@@ -156,6 +163,8 @@ fn shortest(is_in: &[bool], goes_round: bool) -> (usize, usize) {
 
 #[cfg(test)]
 mod tests {
+    use storage::domain::Cells;
+
     use super::*;
 
     fn globe(cols: u32) -> Grid {
@@ -171,9 +180,9 @@ mod tests {
 
     /// Around some cells.
     fn stored(grid: &Grid, cells: &[(u32, u32)]) -> Stored {
-        let mut wanted = vec![false; grid.cell_count()];
+        let mut wanted = Cells::none(grid.cell_count());
         for (row, col) in cells {
-            wanted[(row * grid.cols + col) as usize] = true;
+            wanted.insert((row * grid.cols + col) as usize);
         }
         Stored::part(grid, about(grid, &Wanted::Some(wanted)))
     }
@@ -247,7 +256,9 @@ mod tests {
             let options: Vec<MapOptions> = crops.iter().map(|crop| option(*crop)).collect();
             Stored::of(&grid, &options, wanted)
         };
-        let one = Wanted::Some((0..grid.cell_count()).map(|place| place == 0).collect());
+        let mut first = Cells::none(grid.cell_count());
+        first.insert(0);
+        let one = Wanted::Some(first);
         assert!(of(&[true, false], &one).is_err());
         assert!(of(&[true, true], &Wanted::All).is_err());
         assert_eq!(of(&[true, true], &one).unwrap().grid.cell_count(), 64);

@@ -6,16 +6,18 @@ use contract::earth::Earth;
 use contract::grid::Grid;
 use contract::manifest::Manifest;
 use contract::region::AskedRegion;
+use storage::domain::Cells;
 
 use crate::ComputeError;
-use crate::region::weights::compute;
+use crate::awaited::Awaited;
+use crate::region::weights::{Surface, shared_of};
 
 /// Cells that are wanted.
 pub(super) enum Wanted {
     /// Every cell.
     All,
     /// By their place, row-major.
-    Some(Vec<bool>),
+    Some(Cells),
 }
 
 impl Wanted {
@@ -32,14 +34,15 @@ impl Wanted {
         };
         let grid = &manifest.grid;
         let chunks = field_chunks(grid);
-        let mut cells = vec![false; grid.cell_count()];
-        for (chunk, areas) in compute(grid, &asked.region, Earth::Wgs84)? {
+        let mut cells = Cells::none(grid.cell_count());
+        let (region, awaited) = (&asked.region, &Awaited::always());
+        let weights = shared_of(grid, region, Earth::Wgs84, &Surface::All, None, awaited)?;
+        for (chunk, areas) in weights {
             let places = chunks[chunk as usize].cell_indices(grid);
-            for (place, area) in places.zip(areas) {
-                cells[place] = area > 0.0;
-            }
+            let own = places.zip(areas.iter()).filter(|(_, area)| *area > 0.0);
+            own.for_each(|(place, _)| cells.insert(place));
         }
-        if !cells.contains(&true) {
+        if !cells.is_any() {
             let reason = format!(
                 "it lies outside the grid of {}, which covers {}",
                 manifest.product,
@@ -54,7 +57,7 @@ impl Wanted {
     pub(super) fn is(&self, place: usize) -> bool {
         match self {
             Self::All => true,
-            Self::Some(cells) => cells[place],
+            Self::Some(cells) => cells.has(place),
         }
     }
 
@@ -63,6 +66,14 @@ impl Wanted {
         match self {
             Self::All => true,
             Self::Some(_) => window.cell_indices(grid).any(|place| self.is(place)),
+        }
+    }
+
+    /// How many are wanted of all cells of the grid.
+    pub(super) fn all_count(&self, grid: &Grid) -> usize {
+        match self {
+            Self::All => grid.cell_count(),
+            Self::Some(cells) => cells.count_in(0..grid.cell_count()),
         }
     }
 

@@ -39,11 +39,11 @@ fn pieces(count: u32) -> Vec<Piece> {
         let digest = Digest::of(&at.to_le_bytes());
         Piece {
             key: ObjectKey::field(&"p".parse().unwrap(), &digest),
-            address: format!("memory:///{at}"),
+            address: format!("memory:///{at}").into(),
             layout: Layout::Blocks,
             first_step: at * 5,
             steps: 0..5,
-            rows: vec![0, 1],
+            rows: [0, 1].into(),
             inside: vec![],
         }
     };
