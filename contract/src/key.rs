@@ -59,6 +59,11 @@ impl ObjectKey {
         Self(format!("manifest-pages/{product}/{sha256}.json"))
     }
 
+    /// The hint of a product's newest number: where whoever has not seen the product begins to ask.
+    pub fn newest(product: &ProductId) -> Self {
+        Self(format!("newest/{product}/number.json"))
+    }
+
     /// The pin of a version: that clean-up leaves the manifest of this number and what it names.
     pub fn pin(product: &ProductId, number: u64) -> Self {
         Self(format!("pins/{product}/{number:010}.json"))
@@ -154,6 +159,7 @@ mod tests {
             ObjectKey::domain(&product, &digest),
             ObjectKey::manifest(&product, 7),
             ObjectKey::manifest_page(&product, &digest),
+            ObjectKey::newest(&product),
             ObjectKey::pin(&product, 7),
             ObjectKey::weights(&digest),
             ObjectKey::observations(&product, &digest),

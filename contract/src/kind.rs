@@ -20,6 +20,8 @@ pub enum Kind {
     Manifest,
     /// Steps of manifests, where there are many.
     ManifestPage,
+    /// The newest number of a product's manifests, as a hint: it changes.
+    Newest,
     /// A version that is kept until somebody releases it.
     Pin,
     /// A region's share of every cell.
@@ -61,7 +63,7 @@ pub enum Vouched {
 
 impl Kind {
     /// All of them.
-    pub const ALL: [Self; 20] = [
+    pub const ALL: [Self; 21] = [
         Self::Raw,
         Self::Field,
         Self::Contributed,
@@ -69,6 +71,7 @@ impl Kind {
         Self::Domain,
         Self::Manifest,
         Self::ManifestPage,
+        Self::Newest,
         Self::Pin,
         Self::Weights,
         Self::Sums,
@@ -94,6 +97,7 @@ impl Kind {
             Self::Domain => "domain",
             Self::Manifest => "manifests",
             Self::ManifestPage => "manifest-pages",
+            Self::Newest => "newest",
             Self::Pin => "pins",
             Self::Weights => "weights",
             Self::Sums => "sums",
@@ -149,7 +153,8 @@ mod tests {
             Kind::Series => Some(Kind::Domain),
             Kind::Domain => Some(Kind::Manifest),
             Kind::Manifest => Some(Kind::ManifestPage),
-            Kind::ManifestPage => Some(Kind::Pin),
+            Kind::ManifestPage => Some(Kind::Newest),
+            Kind::Newest => Some(Kind::Pin),
             Kind::Pin => Some(Kind::Weights),
             Kind::Weights => Some(Kind::Sums),
             Kind::Sums => Some(Kind::Cube),
@@ -206,6 +211,7 @@ mod tests {
                 Kind::ManifestPage,
                 Vouched::Nothing,
             ),
+            (ObjectKey::newest(&product), Kind::Newest, Vouched::Nothing),
             (ObjectKey::pin(&product, 7), Kind::Pin, Vouched::Nothing),
             (ObjectKey::weights(&digest), Kind::Weights, Vouched::Nothing),
             (ObjectKey::check(&digest), Kind::Check, Vouched::Nothing),

@@ -62,7 +62,8 @@ pub(crate) async fn text(store: &Store, key: &ObjectKey) -> Result<Option<Vec<u8
     Ok(Some(seal::opened(&content)))
 }
 
-fn sealed<T: Serialize>(key: &ObjectKey, document: &T) -> Result<Bytes, StorageError> {
+/// A document as it is stored.
+pub(crate) fn sealed<T: Serialize>(key: &ObjectKey, document: &T) -> Result<Bytes, StorageError> {
     let text = serde_json::to_vec(document).map_err(|e| StorageError::damaged(key.as_str(), e))?;
     Ok(Bytes::from(seal::json(text)))
 }

@@ -11,6 +11,7 @@ use std::time::Duration;
 
 use contract::key::ObjectKey;
 use contract::kind::Kind;
+use contract::product::ProductId;
 use contract::time::TimeMs;
 use futures::TryStreamExt as _;
 use object_store::ObjectStore as _;
@@ -18,10 +19,10 @@ use object_store::path::Path;
 use serde::Serialize;
 
 use crate::store::{Leftover, PROBES};
-use crate::{StorageError, Store, pins};
+use crate::{StorageError, Store, manifests, pins};
 
 pub use owner::{Kept, LEAST_AGE, Owner};
-pub use versions::{Pictures, Versions};
+pub use versions::{Hints, Pictures, Versions};
 
 /// Kinds of the numbered lists that name everything else.
 const LISTS: [Kind; 2] = [Kind::Manifest, Kind::ObservationIndex];
@@ -184,12 +185,22 @@ pub async fn plan(
     Ok(plan)
 }
 
+/// Has the hints of products whose versions may go say the newest: before one that is kept would stand others that are gone.
+async fn bring_hints_up(store: &Store, plan: &GcPlan) -> Result<(), StorageError> {
+    let keys = plan.garbage.iter().map(|garbage| &garbage.key);
+    let products: BTreeSet<ProductId> = keys.filter_map(manifests::product_of).collect();
+    for product in &products {
+        manifests::bring_hint_up(store, product).await?;
+    }
+    Ok(())
+}
+
 /// Removes what a plan names, but for what has come into use since.
 ///
 /// Returns how many objects and half-written files were removed. A run that was killed is resumed by planning again.
 ///
 /// # Errors
-/// As [`plan`]; and what was put to use by a new version or a pin while it was removed, by name.
+/// As [`plan`]; a hint of a newest number that cannot be written; and what was put to use by a new version or a pin while it was removed, by name.
 pub async fn run(
     store: &Store,
     owners: &[&dyn Owner],
@@ -197,6 +208,8 @@ pub async fn run(
     keep: Keep,
     progress: &(dyn Fn(usize) + Send + Sync),
 ) -> Result<usize, StorageError> {
+    // First, and what is in use after it: who has read an older hint has long asked for what follows.
+    bring_hints_up(store, plan).await?;
     let mut in_use = InUse::read(store, owners, keep, plan.oldest_ms).await?;
     let mut removed = BTreeSet::new();
     for (index, garbage) in plan.garbage.iter().enumerate() {

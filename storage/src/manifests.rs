@@ -1,5 +1,6 @@
 //! Numbered manifests: the newest of a product, one by its name, and the commit of the next.
 
+mod hint;
 mod over_time;
 mod pages;
 mod published;
@@ -32,7 +33,8 @@ pub async fn products(store: &Store) -> Result<Vec<ProductId>, StorageError> {
 
 /// The newest manifest of a product, if it has one.
 ///
-/// Where this process has seen one a short while ago, the next number is asked for and nothing is listed.
+/// The next number is asked for behind the one that this process has seen a short while ago, else behind that of the hint, and nothing is
+/// listed: three small requests where the hint says the newest.
 pub async fn latest(store: &Store, product: &ProductId) -> Result<Option<Manifest>, StorageError> {
     if let Some(known) = store.newest.get(product) {
         let newest = follow(store, product, known).await?;
@@ -42,6 +44,11 @@ pub async fn latest(store: &Store, product: &ProductId) -> Result<Option<Manifes
         }
         // Somebody took it away.
         store.newest.remove(product);
+    } else if let Some(newest) = hinted(store, product).await?
+        && let Some(manifest) = numbered(store, product, newest).await?
+    {
+        store.newest.insert(product.clone(), newest);
+        return Ok(Some(manifest));
     }
     let Some(newest) = numbers(store, product).await?.pop() else {
         return Ok(None);
@@ -63,7 +70,7 @@ pub async fn newest_numbers(store: &Store) -> Result<BTreeMap<ProductId, u64>, S
 }
 
 /// The newest manifest of a product if it is newer than the number that the caller knows: one small request where it is not and
-/// was looked for a short while ago.
+/// was looked for a short while ago, else two where the hint says so.
 ///
 /// That the one it knows is still there is not asked; see [`is_there`].
 pub async fn newer(
@@ -73,8 +80,12 @@ pub async fn newer(
 ) -> Result<Option<Manifest>, StorageError> {
     let newest = match store.newest.get(product) {
         Some(seen) => follow(store, product, known.max(seen)).await?,
-        // Of those that followed it some may be gone.
-        None => last(store, product, known).await?,
+        None => match hinted(store, product).await? {
+            Some(newest) if newest == known => known,
+            Some(newest) if newest > known && is_there(store, product, newest).await? => newest,
+            // Of those that followed it some may be gone.
+            _ => last(store, product, known).await?,
+        },
     };
     store.newest.insert(product.clone(), newest);
     if newest == known {
@@ -90,6 +101,29 @@ pub async fn is_there(
     number: u64,
 ) -> Result<bool, StorageError> {
     store.exists(&ObjectKey::manifest(product, number)).await
+}
+
+/// The newest number by the hint of a product; none where it leads nowhere and a list must tell. Whether that manifest is there is for
+/// the caller to see.
+async fn hinted(store: &Store, product: &ProductId) -> Result<Option<u64>, StorageError> {
+    let Some(hint) = hint::read(store, product).await? else {
+        return Ok(None);
+    };
+    let newest = follow(store, product, hint).await?;
+    // Behind one that is gone others may be gone too.
+    let leads = newest == hint || is_there(store, product, hint).await?;
+    Ok(leads.then_some(newest))
+}
+
+/// Has the hint of a product say its newest number: before versions of it are removed.
+///
+/// # Errors
+/// It could not be written: none may be removed.
+pub(crate) async fn bring_hint_up(store: &Store, product: &ProductId) -> Result<(), StorageError> {
+    match numbers(store, product).await?.pop() {
+        Some(newest) => hint::tell(store, product, newest).await,
+        None => Ok(()),
+    }
 }
 
 /// The last number of those that follow a known one: each is asked for, up to some, behind which it is faster to list.
@@ -117,7 +151,7 @@ pub async fn numbers(store: &Store, product: &ProductId) -> Result<Vec<u64>, Sto
 }
 
 /// The product whose manifest has a key.
-fn product_of(key: &ObjectKey) -> Option<ProductId> {
+pub(crate) fn product_of(key: &ObjectKey) -> Option<ProductId> {
     let own = key.as_str().strip_prefix(Kind::Manifest.folder())?;
     let (product, _name) = own.strip_prefix('/')?.split_once('/')?;
     product.parse().ok()
@@ -164,6 +198,12 @@ pub async fn load(store: &Store, id: &ManifestId) -> Result<Manifest, StorageErr
 /// # Errors
 /// `Conflict` if another writer took the number: read the newest one again and build on it.
 pub async fn commit(store: &Store, manifest: &Manifest) -> Result<ManifestId, StorageError> {
+    let id = put(store, manifest).await?;
+    hint::tell_published(store, &id.product, id.number).await;
+    Ok(id)
+}
+
+async fn put(store: &Store, manifest: &Manifest) -> Result<ManifestId, StorageError> {
     let key = ObjectKey::manifest(&manifest.product, manifest.number);
     if manifest.schema != MANIFEST_SCHEMA {
         let reason = format!("to write, it is of schema {}", manifest.schema);
@@ -285,7 +325,7 @@ mod tests {
     use contract::quantity::Quantity;
     use contract::time::{Period, TimeMs};
 
-    fn manifest(number: u64, title: &str) -> Manifest {
+    pub(super) fn manifest(number: u64, title: &str) -> Manifest {
         let product: ProductId = "p".parse().unwrap();
         Manifest {
             schema: MANIFEST_SCHEMA,

@@ -28,9 +28,10 @@ use sha2::{Digest as _, Sha256};
 pub use object::of_object;
 
 /// Kinds that are JSON documents, sealed or of before that.
-const DOCUMENTS: [Kind; 9] = [
+const DOCUMENTS: [Kind; 10] = [
     Kind::Manifest,
     Kind::ManifestPage,
+    Kind::Newest,
     Kind::Pin,
     Kind::Sums,
     Kind::ObservationIndex,

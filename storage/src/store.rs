@@ -1,4 +1,4 @@
-//! The object store: keys in, bytes out; objects are created once and never change, but for the one kind of `swap`.
+//! The object store: keys in, bytes out; objects are created once and never change, but for those of `swap`.
 //!
 //! One handle for a folder, memory, and the buckets and file systems of other machines. What differs between them is
 //! how an object is created once (`create`), who tries again after a failure that may pass (the clouds' clients

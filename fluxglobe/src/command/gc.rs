@@ -8,7 +8,7 @@ use compute::gc::Computed;
 use cube::clean_up::Cleaned;
 use ingest::{LandingNotes, Readings};
 use observations::Datasets;
-use storage::gc::{self, Keep, Owner, Pictures, Versions};
+use storage::gc::{self, Hints, Keep, Owner, Pictures, Versions};
 use storage::{Store, manifests};
 
 use crate::cli::{Gc, Settings};
@@ -17,8 +17,9 @@ use crate::{deployment, progress};
 
 /// Everybody who lays out objects that clean-up may remove, but for cubes, whose library knows what is in use. Never removed are weights (what they were made from is in
 /// their name alone), pins, notes of files of observations, and what all services agree on.
-const OWNERS: [&dyn Owner; 6] = [
+const OWNERS: [&dyn Owner; 7] = [
     &Versions,
+    &Hints,
     &Pictures,
     &Computed,
     &Datasets,

@@ -171,6 +171,12 @@ fn advice(report: &Report) -> Vec<String> {
             note.key
         ));
     }
+    if let Some(hint) = found(&[Kind::Newest]) {
+        advice.push(format!(
+            "{} is a hint: versions of its product are listed until the next one is published, which writes it again",
+            hint.key
+        ));
+    }
     if let Some(pin) = found(&[Kind::Pin]) {
         advice.push(format!(
             "{} keeps a version that somebody cites: `fluxglobe gc` removes nothing until it is released (fluxglobe keep --release PRODUCT@NUMBER), and pinned again if that is still so",
@@ -241,6 +247,7 @@ mod tests {
             ("raw/p/a", "ingest it again"),
             ("manifests/p/1.json", "restore"),
             ("pins/p/0000000001.json", "keep --release"),
+            ("newest/p/number.json", "the next one is published"),
             ("weights/a.parquet", "when they are next needed"),
         ] {
             let advice = advice(&report(key)).join("; ");

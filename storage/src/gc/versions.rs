@@ -92,6 +92,33 @@ async fn attachments(
     Ok(keys)
 }
 
+/// Hints of newest numbers: kept as long as their product has a version.
+#[derive(Debug)]
+pub struct Hints;
+
+#[async_trait]
+impl Owner for Hints {
+    fn kinds(&self) -> &'static [Kind] {
+        &[Kind::Newest]
+    }
+
+    fn is_made_again(&self) -> bool {
+        true
+    }
+
+    async fn in_use(
+        &self,
+        store: &Store,
+        kept: &Kept,
+    ) -> Result<BTreeSet<ObjectKey>, StorageError> {
+        // Where nobody reads them they are of a copy, and no clean-up brings them up.
+        let kept = kept.manifests.iter().filter(|_| store.exchanges_at_once());
+        Ok(kept
+            .map(|manifest| ObjectKey::newest(&manifest.product))
+            .collect())
+    }
+}
+
 /// Drawn pictures: kept while they are young.
 #[derive(Debug)]
 pub struct Pictures;

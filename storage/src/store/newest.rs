@@ -1,6 +1,7 @@
 //! Numbers of the newest manifests that a process has seen a short while ago: where to look for the next.
 
 use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -10,9 +11,13 @@ use contract::product::ProductId;
 /// Later those behind it may be gone, and it may be pinned: the newest is none of those that follow it one by one.
 const FRESH: Duration = Duration::from_mins(30);
 
-/// By product, with when it was seen that none follows.
 #[derive(Default)]
-pub(crate) struct Newest(Mutex<BTreeMap<ProductId, (u64, Instant)>>);
+pub(crate) struct Newest {
+    /// By product, with when it was seen that none follows.
+    seen: Mutex<BTreeMap<ProductId, (u64, Instant)>>,
+    /// Could the last hint that this process had to write not be written?
+    is_untold: AtomicBool,
+}
 
 impl Newest {
     pub(crate) fn get(&self, product: &ProductId) -> Option<u64> {
@@ -39,8 +44,18 @@ impl Newest {
         self.lock().remove(product);
     }
 
+    /// A hint could not be written: is it the first since one could?
+    pub(crate) fn is_first_untold(&self) -> bool {
+        !self.is_untold.swap(true, Ordering::Relaxed)
+    }
+
+    /// A hint was written, or says what it should.
+    pub(crate) fn was_told(&self) {
+        self.is_untold.store(false, Ordering::Relaxed);
+    }
+
     fn lock(&self) -> std::sync::MutexGuard<'_, BTreeMap<ProductId, (u64, Instant)>> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        self.seen.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -59,5 +74,15 @@ mod tests {
         assert_eq!(newest.get(&product), Some(12));
         newest.remove(&product);
         assert_eq!(newest.get(&product), None);
+    }
+
+    #[test]
+    fn what_cannot_be_told_is_said_once_until_it_goes_well_again() {
+        let newest = Newest::default();
+        for _outage in 0..2 {
+            let said = [(); 3].map(|()| newest.is_first_untold());
+            assert_eq!(said, [true, false, false]);
+            newest.was_told();
+        }
     }
 }

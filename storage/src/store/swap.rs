@@ -1,4 +1,5 @@
-//! The one kind of object that changes: replaced only by who knows what it holds, so that of two writers one is refused.
+//! The kinds of objects that change, the beginning of a cube and the hint of a newest number: each is replaced only by who knows what
+//! it holds, so that of two writers one is refused.
 //!
 //! Buckets and memory compare by themselves (a conditional request). A folder is locked for the moment of the exchange.
 //! A Hadoop file system can do neither, but creates a name once: there each content is an object of its own with the next
@@ -34,6 +35,14 @@ impl Seen {
 }
 
 impl Store {
+    /// Does an exchange take a request or two here, and list nothing?
+    pub(crate) fn exchanges_at_once(&self) -> bool {
+        match self.place {
+            Place::Memory | Place::Folder(_) | Place::Cloud => true,
+            Place::Hdfs => false,
+        }
+    }
+
     /// What an object that changes holds now, and what to replace it with; none if there is none.
     pub async fn read_changing(
         &self,
@@ -61,8 +70,8 @@ impl Store {
 
     /// Replaces what an object held, or creates it if `seen` is none. None if somebody else did so before: read it again.
     ///
-    /// An answer that was lost is made good by reading back: two writers never write the same content, so that what is
-    /// there and equals ours is ours.
+    /// An answer that was lost is made good by reading back: two writers never write the same content, or it is all one whose it
+    /// is, so that what is there and equals ours is ours.
     ///
     /// # Errors
     /// A retryable one if it is not known what happened.

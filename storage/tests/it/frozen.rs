@@ -274,6 +274,7 @@ async fn own(store: &Store) -> Vec<ObjectKey> {
         Kind::Domain,
         Kind::Contributed,
         Kind::Manifest,
+        Kind::Newest,
         Kind::Pin,
     ] {
         let folder = format!("{}/{}", kind.folder(), product());
@@ -359,6 +360,15 @@ async fn a_frozen_pin_says_which_version_is_kept_and_why() {
     assert_eq!(pin.since, pinned_at());
     // The version is there, by the name that it was pinned under.
     assert_eq!(pins::lacking(&store, &pin.version).await.unwrap(), None);
+}
+
+#[tokio::test]
+async fn a_frozen_hint_leads_to_the_newest_version() {
+    let (_folder, store) = copy(2);
+    let (counted, traffic) = store.counted();
+    let newest = manifests::latest(&counted, &product()).await.unwrap();
+    assert_eq!(newest.unwrap().number, 2);
+    assert_eq!(traffic.counts().lists, 0, "nobody read the hint");
 }
 
 #[tokio::test]

@@ -52,6 +52,13 @@ async fn what_was_seen_is_replaced_and_what_came_after_is_not() {
     }
 }
 
+#[test]
+fn an_exchange_lists_on_a_hadoop_file_system_alone() {
+    for (kind, store) in stores().1 {
+        assert_eq!(store.exchanges_at_once(), kind != "numbered", "{kind}");
+    }
+}
+
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn no_increment_of_four_writers_is_lost() {
     const WRITERS: u32 = 4;

@@ -50,6 +50,11 @@ fn reader(kind: Kind) -> Reader {
             "storage/tests/it/frozen.rs",
             "a_frozen_page_holds_the_steps_of_its_manifest",
         ),
+        // Versions were listed before.
+        Kind::Newest => since_2(
+            "storage/tests/it/frozen.rs",
+            "a_frozen_hint_leads_to_the_newest_version",
+        ),
         // Versions could not be pinned before.
         Kind::Pin => since_2(
             "storage/tests/it/frozen.rs",
