@@ -11,7 +11,8 @@ use contract::product::ProductId;
 use contract::time::Period;
 use futures::{FutureExt as _, StreamExt as _, TryStreamExt as _, stream};
 use rayon::prelude::*;
-use storage::{domain, fields};
+use storage::domain::{self, Cells};
+use storage::fields;
 
 use super::super::{DeriveProgress, Progress};
 use super::blocks::{Blocks, GROUPS_AT_ONCE, Pieces, Reading};
@@ -286,7 +287,7 @@ impl Landing<'_> {
             ..
         } = *self;
         let source = sources.first;
-        if !found.cells.contains(&true) {
+        if !found.cells.is_any() {
             let name = plan.statistic.to_string();
             return Err(ContractError::invalid("statistic", &name, self.nothing()).into());
         }
@@ -300,7 +301,7 @@ impl Landing<'_> {
             source: sources.citation(),
             grid: self.stored.grid,
             steps,
-            domain: domain::write(self.engine.store(), target, &found.cells).await?,
+            domain: domain::write_cells(self.engine.store(), target, found.cells.clone()).await?,
             series: vec![],
             derived_from: Some(source.id()),
             computed: Some(plan.computed.clone()),
@@ -338,7 +339,7 @@ impl Landing<'_> {
 /// What all steps together hold.
 pub(super) struct Found {
     /// Cells that hold data in some step.
-    cells: Vec<bool>,
+    cells: Cells,
     /// Lowest and highest value.
     range: [f64; 2],
     /// How many values there were.
@@ -348,7 +349,7 @@ pub(super) struct Found {
 impl Found {
     pub(super) fn nothing(cell_count: usize) -> Self {
         Self {
-            cells: vec![false; cell_count],
+            cells: Cells::none(cell_count),
             range: [f64::INFINITY, f64::NEG_INFINITY],
             valid_cells: 0,
         }
@@ -356,9 +357,8 @@ impl Found {
 
     /// Adds a step; of how many cells it is told which hold data was said at first.
     pub(super) fn add(&mut self, values: &[f32]) {
-        for (cell, value) in self.cells.iter_mut().zip(values) {
-            *cell |= !value.is_nan();
-        }
+        let told = values.len().min(self.cells.map_count());
+        self.cells.add_valued(0, &values[..told]);
         let (mut low, mut high) = (f32::INFINITY, f32::NEG_INFINITY);
         for value in values {
             low = if *value < low { *value } else { low };
@@ -366,7 +366,7 @@ impl Found {
         }
         let has_data = values.iter().filter(|value| !value.is_nan());
         self.merge(&Self {
-            cells: vec![],
+            cells: Cells::none(0),
             range: [low, high].map(f64::from),
             valid_cells: has_data.count() as u64,
         });
@@ -374,13 +374,11 @@ impl Found {
 
     /// A cell, by its place, holds data.
     pub(super) fn has_data(&mut self, place: usize) {
-        self.cells[place] = true;
+        self.cells.insert(place);
     }
 
     pub(super) fn merge(&mut self, other: &Self) {
-        for (own, other) in self.cells.iter_mut().zip(&other.cells) {
-            *own |= other;
-        }
+        self.cells.add(&other.cells);
         self.valid_cells += other.valid_cells;
         let ([low, high], [other_low, other_high]) = (self.range, other.range);
         self.range = [low.min(other_low), high.max(other_high)];
