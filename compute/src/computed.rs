@@ -36,7 +36,7 @@ pub use request::{Request, RequestedInput};
 
 /// Values that a task looks through for the cells that hold data: 256 MiB of f32, whatever the grid.
 const RUN_VALUES: usize = 64 << 20;
-/// Steps that it looks through at the least: what it finds is a byte a cell in the store until clean-up.
+/// Steps that it looks through at the least: what it finds lies in the store until clean-up.
 const LEAST_RUN: usize = 16;
 /// Steps that are asked of the engine at a time, so that progress is told.
 const STEPS_AT_A_TIME: usize = 1024;
@@ -293,7 +293,11 @@ impl Plan {
             if made.first != task.first {
                 return Err(not_asked());
             }
-            cells.add(&domain::read_cells(engine.store(), &made.domain).await?);
+            let own = domain::read_cells(engine.store(), &made.domain).await?;
+            if own.map_count() != cells.map_count() {
+                return Err(not_asked());
+            }
+            cells.add(&own);
         }
         Ok(domain::write_cells(engine.store(), &self.job.target, cells).await?)
     }

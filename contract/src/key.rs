@@ -44,7 +44,7 @@ impl ObjectKey {
         Self(format!("contributed/{product}/{sha256}.parquet"))
     }
 
-    /// The cells that hold data in some step, one byte a cell, named by its bytes.
+    /// The cells that hold data in some step, named by its bytes.
     pub fn domain(product: &ProductId, sha256: &Digest) -> Self {
         Self(format!("domain/{product}/{sha256}"))
     }

@@ -52,7 +52,7 @@ pub struct Manifest {
     pub grid: Grid,
     /// Steps in the order of time, not overlapping.
     pub steps: Vec<Step>,
-    /// Cells that hold data in some step: one byte a cell, 1 or 0, row-major.
+    /// Cells that hold data in some step: a set of their numbers, row-major.
     pub domain: ObjectKey,
     /// The same values time-major.
     pub series: Vec<SeriesSegment>,

@@ -348,9 +348,13 @@ impl Source {
 
     async fn domain(&self, grid: &Grid, key: &ObjectKey) -> Result<Arc<Cells<u32>>, DrawError> {
         let reading = async {
-            let read = storage::domain::read(&self.store, key).await;
-            let flags = read.map_err(|e| failed("the domain", key, e))?;
-            Ok::<_, DrawError>(Scene::domain_of(flags))
+            let read = storage::domain::read_cells(&self.store, key).await;
+            let cells = read.map_err(|e| failed("the domain", key, e))?;
+            // A few bytes may stand for any number of cells.
+            if cells.map_count() != grid.cell_count() {
+                return Err(DrawError::mismatch(key));
+            }
+            Ok(Scene::domain_of(cells.flags(0..cells.map_count())))
         };
         let kept = self.domains.get_or_insert_async(key, reading);
         let domain = kept.await?;

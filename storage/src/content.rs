@@ -1,5 +1,4 @@
-//! What is to be stored: bytes in memory, or a file of this process's own, or what is made piece by piece, where all of it is too
-//! large to be held.
+//! What is to be stored: bytes in memory, or a file of this process's own where all of it is too large to be held.
 
 use std::fmt::{Debug, Formatter};
 use std::fs::File;
@@ -26,8 +25,6 @@ pub enum Content {
     /// A file, read piece by piece. Nobody may write to it meanwhile: what is named by its bytes is compared with its name as it
     /// is sent, and what is named by its values was hashed as it was written.
     File(Arc<File>, u64),
-    /// So many bytes that are made where they are asked for, the same each time.
-    Made(Arc<dyn Fn(Range<u64>) -> Bytes + Send + Sync>, u64),
 }
 
 /// Shows what it is and how large, and none of it.
@@ -36,7 +33,6 @@ impl Debug for Content {
         let kind = match self {
             Self::Bytes(_) => "Bytes",
             Self::File(..) => "File",
-            Self::Made(..) => "Made",
         };
         f.debug_tuple(kind).field(&self.size_bytes()).finish()
     }
@@ -56,7 +52,7 @@ impl Content {
     pub fn size_bytes(&self) -> u64 {
         match self {
             Self::Bytes(bytes) => bytes.len() as u64,
-            Self::File(_, size_bytes) | Self::Made(_, size_bytes) => *size_bytes,
+            Self::File(_, size_bytes) => *size_bytes,
         }
     }
 
@@ -78,10 +74,6 @@ impl Content {
                 file.read_exact_at(&mut part, range.start)?;
                 Ok(part.into())
             }
-            Self::Made(_, size_bytes) if range.end > *size_bytes => {
-                Err(io::ErrorKind::UnexpectedEof.into())
-            }
-            Self::Made(make, _) => Ok(make(range)),
         }
     }
 
@@ -197,11 +189,7 @@ mod tests {
         let text: Vec<u8> = (0..1000u32).map(|i| i as u8).collect();
         let product = "p".parse().unwrap();
         let key = ObjectKey::raw(&product, &Digest::of(&text));
-        let own = text.clone();
-        let make =
-            move |part: Range<u64>| own[part.start as usize..part.end as usize].to_vec().into();
-        let made = Content::Made(Arc::new(make), text.len() as u64);
-        for content in [file(&text), Content::Bytes(text.clone().into()), made] {
+        for content in [file(&text), Content::Bytes(text.clone().into())] {
             let pieces: Vec<Bytes> = content.pieces(&key, 300).map(Result::unwrap).collect();
             assert_eq!(pieces.len(), 4);
             assert_eq!(pieces.concat(), text);

@@ -1,148 +1,40 @@
-//! The domain of a product: which cells hold data in some step. It is stored as one byte a cell; who makes one holds a bit a
-//! cell, and no more of its bytes than a piece.
+//! The domain of a product: which cells hold data in some step. It is stored as a set of their numbers, compressed; what was
+//! stored before as a byte a cell is read for ever.
+//!
+//! An object is 16 bytes, then the set in the portable form of Roaring bitmaps
+//! (<https://github.com/RoaringBitmap/RoaringFormatSpec>), which libraries of many languages read: `FGDM`, the version of the
+//! form (u32, 2) and how many cells the map has (u64), both with the lowest byte first. Equal sets have equal bytes.
 
-use std::ops::Range;
-use std::sync::Arc;
+mod cells;
 
 use bytes::Bytes;
 use contract::digest::Digest;
+use contract::grid::MAX_CELLS;
 use contract::key::ObjectKey;
+use contract::kind::Vouched;
 use contract::product::ProductId;
 use futures::StreamExt as _;
 use object_store::ObjectStoreExt as _;
 use object_store::path::Path;
+use roaring::RoaringBitmap;
 use sha2::{Digest as _, Sha256};
 
-use crate::content::{Content, PIECE_BYTES};
 use crate::off_thread::off_thread;
 use crate::sound::damage;
 use crate::store::failed;
 use crate::{StorageError, Store};
+pub use cells::Cells;
 
-const WORD_BITS: usize = 64;
-const NO_BYTE: &str = "a byte is not 0 or 1";
+/// What an object of now begins with; one of before begins with a 0 or a 1.
+const MAGIC: [u8; 4] = *b"FGDM";
+/// The first form was a byte a cell, and said nothing of itself.
+const VERSION: u32 = 2;
+const HEAD_BYTES: usize = 16;
 
-/// Some cells of a map, `[row, col]`, a bit each.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Cells {
-    words: Vec<u64>,
-    count: usize,
-}
-
-impl Cells {
-    /// None of so many cells.
-    pub fn none(count: usize) -> Self {
-        Self {
-            words: vec![0; count.div_ceil(WORD_BITS)],
-            count,
-        }
-    }
-
-    /// Cells of the map.
-    pub fn map_count(&self) -> usize {
-        self.count
-    }
-
-    /// Is there any?
-    pub fn is_any(&self) -> bool {
-        self.words.iter().any(|word| *word != 0)
-    }
-
-    /// Is it one of them?
-    ///
-    /// # Panics
-    /// The map has no such cell.
-    pub fn has(&self, cell: usize) -> bool {
-        self.words[cell / WORD_BITS] >> (cell % WORD_BITS) & 1 == 1
-    }
-
-    /// How many of the cells of a range are of them.
-    ///
-    /// # Panics
-    /// The map has not so many.
-    pub fn count_in(&self, cells: Range<usize>) -> usize {
-        let (mut cell, mut count) = (cells.start, 0);
-        while cell < cells.end {
-            let place = cell % WORD_BITS;
-            let own = (WORD_BITS - place).min(cells.end - cell);
-            let mask = u64::MAX >> (WORD_BITS - own) << place;
-            count += (self.words[cell / WORD_BITS] & mask).count_ones() as usize;
-            cell += own;
-        }
-        count
-    }
-
-    /// All of them, ascending.
-    pub fn iter(&self) -> impl Iterator<Item = usize> + '_ {
-        self.words.iter().enumerate().flat_map(|(at, word)| {
-            let mut left = *word;
-            std::iter::from_fn(move || {
-                let bit = left.trailing_zeros() as usize;
-                left &= left.checked_sub(1)?;
-                Some(at * WORD_BITS + bit)
-            })
-        })
-    }
-
-    /// Adds one.
-    ///
-    /// # Panics
-    /// The map has no such cell.
-    pub fn insert(&mut self, cell: usize) {
-        self.words[cell / WORD_BITS] |= 1 << (cell % WORD_BITS);
-    }
-
-    /// Adds those of the cells from `first` on that hold a value; NaN is none.
-    ///
-    /// # Panics
-    /// The map has not so many.
-    pub fn add_valued(&mut self, first: usize, values: &[f32]) {
-        self.each_word(first, values, |word, valued| *word |= valued);
-    }
-
-    /// Takes those of the cells from `first` on away that hold a value.
-    ///
-    /// # Panics
-    /// The map has not so many.
-    pub fn remove_valued(&mut self, first: usize, values: &[f32]) {
-        self.each_word(first, values, |word, valued| *word &= !valued);
-    }
-
-    /// Hands over each word that has cells from `first` on, and which of them hold a value.
-    fn each_word(&mut self, first: usize, values: &[f32], mut take: impl FnMut(&mut u64, u64)) {
-        let (mut cell, mut left) = (first, values);
-        while !left.is_empty() {
-            let place = cell % WORD_BITS;
-            let (own, others) = left.split_at(left.len().min(WORD_BITS - place));
-            let bits = own.iter().enumerate();
-            let valued = bits.fold(0, |word, (at, value)| {
-                word | u64::from(!value.is_nan()) << at
-            });
-            take(&mut self.words[cell / WORD_BITS], valued << place);
-            (cell, left) = (cell + own.len(), others);
-        }
-    }
-
-    /// Adds others of the same map.
-    pub fn add(&mut self, others: &Self) {
-        for (word, other) in self.words.iter_mut().zip(&others.words) {
-            *word |= other;
-        }
-    }
-
-    /// Takes others of the same map away.
-    pub fn remove(&mut self, others: &Self) {
-        for (word, other) in self.words.iter_mut().zip(&others.words) {
-            *word &= !other;
-        }
-    }
-
-    /// The bytes of some of them as they are stored.
-    fn bytes(&self, cells: Range<u64>) -> Bytes {
-        let cells = cells.start as usize..cells.end as usize;
-        cells.map(|cell| u8::from(self.has(cell))).collect()
-    }
-}
+/// Numbers that a container of a Roaring bitmap is of, and the most bytes that one takes with what is said of it.
+const CONTAINER_CELLS: u64 = 1 << 16;
+const CONTAINER_BYTES: u64 = (8 << 10) + 16;
+const SET_HEAD_BYTES: u64 = 16;
 
 /// Stores a domain (`[row, col]`) under the digest of its bytes.
 pub async fn write(
@@ -150,127 +42,180 @@ pub async fn write(
     product: &ProductId,
     cells: &[bool],
 ) -> Result<ObjectKey, StorageError> {
-    let content: Vec<u8> = cells.iter().map(|&cell| u8::from(cell)).collect();
-    let key = ObjectKey::domain(product, &Digest::of(&content));
-    store.put_new(&key, Bytes::from(content)).await?;
-    Ok(key)
+    write_cells(store, product, Cells::of(cells)).await
 }
 
-/// The same of cells that are held as bits.
+/// The same of cells that are held as a set.
 pub async fn write_cells(
     store: &Store,
     product: &ProductId,
     cells: Cells,
 ) -> Result<ObjectKey, StorageError> {
-    let cells = Arc::new(cells);
-    let size_bytes = cells.count as u64;
-    let own = Arc::clone(&cells);
-    let digest = off_thread(move || {
-        let mut hasher = Sha256::new();
-        for start in (0..size_bytes).step_by(PIECE_BYTES as usize) {
-            hasher.update(own.bytes(start..size_bytes.min(start + PIECE_BYTES)));
-        }
-        Ok(Digest::from_bytes(hasher.finalize().into()))
+    let made = off_thread(move || {
+        let content = content(cells);
+        Ok((Digest::of(&content), Bytes::from(content)))
     });
-    let key = ObjectKey::domain(product, &digest.await?);
-    let content = Content::Made(Arc::new(move |part| cells.bytes(part)), size_bytes);
-    store.put_new_content(&key, content).await?;
+    let (digest, content) = made.await?;
+    let key = ObjectKey::domain(product, &digest);
+    store.put_new(&key, content).await?;
     Ok(key)
 }
 
-/// Reads a domain, whose bytes must be those of its name.
-pub async fn read(store: &Store, key: &ObjectKey) -> Result<Vec<bool>, StorageError> {
-    let content = store.get(key).await?;
-    if content.iter().any(|&byte| byte > 1) {
-        return Err(damage::found(key, NO_BYTE));
-    }
-    Ok(content.iter().map(|&byte| byte == 1).collect())
+/// The bytes of a domain.
+fn content(cells: Cells) -> Vec<u8> {
+    let Cells { mut set, count } = cells;
+    // Which form a container takes must not depend on the one that it had: from an array or bits, which its numbers decide,
+    // it becomes runs where these are smaller.
+    set.remove_run_compression();
+    set.optimize();
+    let mut content = Vec::with_capacity(HEAD_BYTES + set.serialized_size());
+    content.extend(MAGIC);
+    content.extend(VERSION.to_le_bytes());
+    content.extend((count as u64).to_le_bytes());
+    set.serialize_into(&mut content)
+        .expect("memory takes all that is written");
+    content
 }
 
-/// The same as bits, read as it comes.
+/// Reads a domain as a flag a cell: of a map that is small.
+pub async fn read(store: &Store, key: &ObjectKey) -> Result<Vec<bool>, StorageError> {
+    let cells = read_cells(store, key).await?;
+    Ok(cells.flags(0..cells.map_count()))
+}
+
+/// Reads a domain, whose bytes must be those of its name, as it comes: one of before is no larger in memory than one of now.
 pub async fn read_cells(store: &Store, key: &ObjectKey) -> Result<Cells, StorageError> {
     let found = store.object_store().get(&Path::from(key.as_str())).await;
     let found = found.map_err(|e| failed(key, e))?;
-    let mut cells = Cells::none(0);
+    let mut reading = Reading::Nothing;
     let mut hasher = Sha256::new();
     let mut pieces = found.into_stream();
     while let Some(piece) = pieces.next().await {
         let piece = piece.map_err(|e| failed(key, e))?;
-        if piece.iter().any(|&byte| byte > 1) {
-            return Err(damage::found(key, NO_BYTE));
-        }
+        let taken = reading.take(&piece);
+        taken.map_err(|reason| damage::found(key, reason))?;
         hasher.update(&piece);
-        let first = cells.count;
-        cells.count += piece.len();
-        cells.words.resize(cells.count.div_ceil(WORD_BITS), 0);
-        for (cell, byte) in (first..).zip(&piece) {
-            cells.words[cell / WORD_BITS] |= u64::from(*byte) << (cell % WORD_BITS);
-        }
     }
     let digest = Digest::from_bytes(hasher.finalize().into());
-    if key.vouches() == contract::kind::Vouched::Bytes(digest) {
-        Ok(cells)
-    } else {
-        Err(damage::found(key, format!("its digest is {digest}")))
+    if key.vouches() != Vouched::Bytes(digest) {
+        return Err(damage::found(key, format!("its digest is {digest}")));
     }
+    let read = reading.finish();
+    read.map_err(|reason| damage::found(key, reason))
+}
+
+/// Are these the bytes of a domain?
+pub(crate) fn check(key: &ObjectKey, content: &[u8]) -> Result<(), StorageError> {
+    let mut reading = Reading::Nothing;
+    let read = reading.take(content).and_then(|()| reading.finish());
+    read.map(|_cells| ())
+        .map_err(|reason| damage::found(key, reason))
+}
+
+/// A domain that comes piece by piece; what is wrong with it is told as a reason.
+enum Reading {
+    Nothing,
+    /// As it was stored before: a byte a cell, 0 or 1.
+    Flags(Cells),
+    /// What came of an object of now.
+    Packed(Vec<u8>),
+}
+
+impl Reading {
+    fn take(&mut self, piece: &[u8]) -> Result<(), String> {
+        if let (Self::Nothing, Some(first)) = (&*self, piece.first()) {
+            *self = match first {
+                0 | 1 => Self::Flags(Cells::none(0)),
+                _ => Self::Packed(vec![]),
+            };
+        }
+        match self {
+            Self::Nothing => Ok(()),
+            Self::Flags(cells) => {
+                if piece.iter().any(|&byte| byte > 1) {
+                    return Err("a byte is not 0 or 1".to_owned());
+                }
+                let first = cells.map_count();
+                check_count((first + piece.len()) as u64)?;
+                cells.count += piece.len();
+                cells.add_where(first, piece, |byte| *byte == 1);
+                Ok(())
+            }
+            Self::Packed(content) => {
+                content.extend_from_slice(piece);
+                let Some((head, set)) = content.split_first_chunk() else {
+                    return Ok(());
+                };
+                let most_bytes = most_bytes(cell_count(head)?);
+                if set.len() as u64 > most_bytes {
+                    return Err(format!("its set has more than {most_bytes} bytes"));
+                }
+                Ok(())
+            }
+        }
+    }
+
+    fn finish(self) -> Result<Cells, String> {
+        let content = match self {
+            Self::Nothing => return Ok(Cells::none(0)),
+            Self::Flags(cells) => return Ok(cells),
+            Self::Packed(content) => content,
+        };
+        let (head, bytes) = content
+            .split_first_chunk()
+            .ok_or_else(|| format!("it ends after {} bytes", content.len()))?;
+        let count = cell_count(head)?;
+        let set = RoaringBitmap::deserialize_from(bytes);
+        let set = set.map_err(|e| format!("its set cannot be read: {e}"))?;
+        if let Some(last) = set.max().filter(|last| u64::from(*last) >= count) {
+            return Err(format!("it holds cell {last} of a map of {count}"));
+        }
+        // The library takes numbers of containers and their places on trust, where others go by them.
+        let mut again = Vec::with_capacity(bytes.len());
+        set.serialize_into(&mut again)
+            .expect("memory takes all that is written");
+        if again != bytes {
+            return Err("its set is not what it says of its parts".to_owned());
+        }
+        Ok(Cells {
+            set,
+            count: count as usize,
+        })
+    }
+}
+
+/// How many cells the map has, by the head of an object.
+fn cell_count(head: &[u8; HEAD_BYTES]) -> Result<u64, String> {
+    let number = |bytes: &[u8]| {
+        let bytes = bytes.iter().rev();
+        bytes.fold(0, |number, byte| number << 8 | u64::from(*byte))
+    };
+    if head[..4] != MAGIC {
+        return Err("it does not begin as a domain does".to_owned());
+    }
+    let (version, count) = (number(&head[4..8]), number(&head[8..]));
+    if version != u64::from(VERSION) {
+        return Err(format!(
+            "its form is of version {version}, and 1 and {VERSION} are read"
+        ));
+    }
+    check_count(count)?;
+    Ok(count)
+}
+
+fn check_count(count: u64) -> Result<(), String> {
+    if count > MAX_CELLS {
+        return Err(format!(
+            "it is of more than the {MAX_CELLS} cells that a map may have"
+        ));
+    }
+    Ok(())
+}
+
+/// Most bytes of a set over so many cells, all of whose containers are bits.
+fn most_bytes(count: u64) -> u64 {
+    SET_HEAD_BYTES + count.div_ceil(CONTAINER_CELLS) * CONTAINER_BYTES
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[tokio::test]
-    async fn a_domain_round_trips() {
-        let store = Store::memory();
-        let cells = [true, false, true];
-        let key = write(&store, &"p".parse().unwrap(), &cells).await.unwrap();
-        assert_eq!(read(&store, &key).await.unwrap(), cells);
-        store
-            .put_over(&key, Bytes::from(vec![1, 0, 0]))
-            .await
-            .unwrap();
-        let error = read(&store, &key).await.unwrap_err();
-        assert!(error.to_string().contains(key.as_str()), "{error}");
-        let error = read_cells(&store, &key).await.unwrap_err();
-        assert!(error.to_string().contains(key.as_str()), "{error}");
-    }
-
-    #[tokio::test]
-    async fn bits_and_bytes_are_the_same_domain() {
-        let store = Store::memory();
-        let product = "p".parse().unwrap();
-        let some = |i: usize| i.is_multiple_of(3) || i.is_multiple_of(7);
-        let bytes: Vec<bool> = (0..1000).map(some).collect();
-        let value = |i: usize| if some(i) { 1.0 } else { f32::NAN };
-        let mut cells = Cells::none(1000);
-        for first in [0, 130, 500] {
-            let values: Vec<f32> = (first..1000).map(value).collect();
-            cells.add_valued(first, &values);
-        }
-        let key = write(&store, &product, &bytes).await.unwrap();
-        assert_eq!(
-            write_cells(&store, &product, cells.clone()).await.unwrap(),
-            key
-        );
-        assert_eq!(read_cells(&store, &key).await.unwrap(), cells);
-        assert_eq!((0..1000).map(|i| cells.has(i)).collect::<Vec<_>>(), bytes);
-        for range in [0..1000, 63..65, 1..130, 128..192, 960..1000] {
-            let count = range.clone().filter(|i| some(*i)).count();
-            assert_eq!(cells.count_in(range.clone()), count, "{range:?}");
-        }
-        let mut rest = cells.clone();
-        rest.remove_valued(0, &(0..600).map(value).collect::<Vec<_>>());
-        assert!(!rest.has(0) && !rest.has(597) && rest.has(600) && rest.is_any());
-        cells.remove(&rest);
-        assert!(cells.has(597) && !cells.has(600));
-        rest.remove_valued(600, &[0.0; 400]);
-        assert!(!rest.is_any());
-        let [mut first, mut second] = [Cells::none(1000), Cells::none(1000)];
-        first.add_valued(0, &(0..500).map(value).collect::<Vec<_>>());
-        second.add_valued(500, &(500..1000).map(value).collect::<Vec<_>>());
-        first.add(&second);
-        assert_eq!(write_cells(&store, &product, first).await.unwrap(), key);
-        rest.add(&cells);
-        assert!(rest.has(597) && !rest.has(600) && rest == cells);
-    }
-}
+mod tests;

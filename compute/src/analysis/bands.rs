@@ -223,13 +223,14 @@ impl Bands {
         sums
     }
 
-    /// Areas of each band; some cells of the grid are told by row and column. Of these it is what sums of a field over them have, to the
-    /// bit.
-    pub fn areas(&self, is_some: impl Fn(u32, u32) -> bool) -> Vec<BandAreas> {
+    /// Areas of each band; some cells of the grid are told by a flag a column of a row. Of these it is what sums of a field over them
+    /// have, to the bit.
+    pub fn areas(&self, some_of_row: impl Fn(u32) -> Vec<bool>) -> Vec<BandAreas> {
         let windows = self.windows();
         let mut bands = vec![BandAreas::default(); self.edges_deg.len()];
         let mut cells = vec![];
         for row in self.rows.clone() {
+            let is_some = some_of_row(row);
             for window in &windows {
                 self.fill(row, window, &mut cells);
                 for (col, area) in (window.col..).zip(&cells) {
@@ -239,7 +240,7 @@ impl Bands {
                     let own = &mut bands[band];
                     own.all_m2 += area.area_m2;
                     own.covered_m2 += area.covered_m2;
-                    if is_some(row, col) {
+                    if is_some[col as usize] {
                         own.some_m2 += area.area_m2;
                     }
                 }
@@ -408,7 +409,7 @@ mod tests {
                 .iter()
                 .map(|sum| sum.area_m2)
                 .collect();
-            let found = bands.areas(|row, col| (row * 6 + col) % 5 != 3);
+            let found = bands.areas(|row| (0..6).map(|col| (row * 6 + col) % 5 != 3).collect());
             let found: Vec<f64> = found.iter().map(|own| own.some_m2).collect();
             assert!(expected.len() > 2 && expected.iter().all(|area| *area > 0.0));
             let bits = |areas: &[f64]| areas.iter().map(|area| area.to_bits()).collect::<Vec<_>>();

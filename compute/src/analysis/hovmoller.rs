@@ -228,7 +228,8 @@ async fn areas(
         ));
     }
     let cols = manifest.grid.cols as usize;
-    Ok(bands.areas(|row, col| cells.has(row as usize * cols + col as usize)))
+    let of_row = |row: u32| cells.flags(row as usize * cols..(row as usize + 1) * cols);
+    Ok(bands.areas(of_row))
 }
 
 /// Sums of each bin and band, by area and seconds, with squares where they are asked for.

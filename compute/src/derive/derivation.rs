@@ -46,7 +46,7 @@ impl<'a> Derivation<'a> {
         let counts = prior.contributed(store, grid).await?;
         let cells = with_data(workshop, source, steps, &prior).await?;
         let domain = domain::write_cells(store, target, cells.clone()).await?;
-        prior.over_domain(store, &domain).await?;
+        prior.over_domain(store, (&domain, &cells)).await?;
         let start = steps.first().map(|step| step.period.start);
         let start = start.expect("there is a step to accumulate");
         let mut begun = Self {

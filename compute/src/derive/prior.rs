@@ -46,15 +46,23 @@ impl<'a> Prior<'a> {
         }
     }
 
-    /// Goes on over the domain of now: kept steps of another one are stored anew over it.
+    /// Goes on over the domain of now: kept steps of another one are stored anew over it. The same cells under another name, as
+    /// they were stored before, are no other one.
     pub(super) async fn over_domain(
         &mut self,
         store: &Store,
-        domain_now: &ObjectKey,
+        (domain_now, cells_now): (&ObjectKey, &Cells),
     ) -> Result<(), ComputeError> {
         let before = self.manifest.map(|manifest| &manifest.domain);
         if let Some(before) = before.filter(|before| *before != domain_now) {
-            self.other_domain = Some(domain::read_cells(store, before).await?);
+            let cells = domain::read_cells(store, before).await?;
+            if cells.map_count() != cells_now.map_count() {
+                return Err(ComputeError::inconsistent(
+                    before.to_string(),
+                    "it does not fill its product's grid",
+                ));
+            }
+            self.other_domain = (cells != *cells_now).then_some(cells);
         }
         Ok(())
     }
@@ -111,10 +119,12 @@ impl<'a> Prior<'a> {
         while let Some((rows, mut values)) = bands.next().await? {
             if let Some(before) = &self.other_domain {
                 let first = rows.start as usize * grid.cols as usize;
-                for (cell, value) in (first..).zip(&mut values) {
-                    if !domain_now.has(cell) {
+                let [is_now, was] =
+                    [domain_now, before].map(|cells| cells.flags(first..first + values.len()));
+                for ((value, is_now), was) in values.iter_mut().zip(is_now).zip(was) {
+                    if !is_now {
                         *value = f32::NAN;
-                    } else if !before.has(cell) {
+                    } else if !was {
                         *value = 0.0;
                     }
                 }

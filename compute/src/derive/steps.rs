@@ -215,9 +215,8 @@ struct Segment<'a> {
     grid: Grid,
     windows: Vec<Window>,
     first_chunk: u32,
-    first_cell: usize,
-    /// Of the whole grid.
-    domain: &'a Cells,
+    /// Cells of the band that are of the domain.
+    is_of_domain: Vec<bool>,
     /// Index of a step by the start of its source's period, ms.
     index_of: BTreeMap<i64, usize>,
     /// Exact sums before this run.
@@ -230,15 +229,14 @@ struct Segment<'a> {
 }
 
 impl<'a> Segment<'a> {
-    fn new(band: &Band, run: &[SourceStep<'_>], domain: &'a Cells, before: &'a [i64]) -> Self {
+    fn new(band: &Band, run: &[SourceStep<'_>], domain: &Cells, before: &'a [i64]) -> Self {
         let starts = run.iter().enumerate();
-        let grid = band.grid();
+        let (grid, first_cell) = (band.grid(), band.first_cell());
         Self {
             grid,
             windows: field_chunks(&grid),
             first_chunk: band.first_chunk(),
-            first_cell: band.first_cell(),
-            domain,
+            is_of_domain: domain.flags(first_cell..first_cell + grid.cell_count()),
             index_of: starts
                 .map(|(index, step)| (step.step.period.start.ms(), index))
                 .collect(),
@@ -287,7 +285,7 @@ impl<'a> Segment<'a> {
             .map_err(|e| ComputeError::inconsistent("accumulated carbon", e))?;
         let is_last = step + 1 == self.columns.len();
         for (&index, total) in indices.iter().zip(totals) {
-            if self.domain.has(self.first_cell + index) {
+            if self.is_of_domain[index] {
                 self.columns[step][index] = column_kg_m2(total);
             }
             if is_last {

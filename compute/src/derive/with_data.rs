@@ -38,10 +38,7 @@ pub(super) async fn with_data(
         let mut counts = Reader::open(store, &kept.counts, grid).await?;
         for rows in bands(grid, workshop.band_cells) {
             let own = counts.rows(rows.len() as u32)?;
-            let counted = (first_cell(rows.start)..).zip(&own.steps);
-            for (cell, _) in counted.filter(|(_, steps)| **steps > 0) {
-                cells.insert(cell);
-            }
+            cells.add_where(first_cell(rows.start), &own.steps, |steps| *steps > 0);
         }
     }
     for step in &steps[prior.step_count..] {

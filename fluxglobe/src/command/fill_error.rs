@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use anyhow::{Context as _, Result};
+use anyhow::{Context as _, Result, ensure};
 use comfy_table::presets::NOTHING;
 use comfy_table::{CellAlignment, Table};
 use contract::manifest::Manifest;
@@ -78,11 +78,14 @@ struct Trial {
 pub(crate) async fn run(settings: &Settings, options: &FillError) -> Result<()> {
     let store = deployment::store(settings)?;
     let manifest = deployment::manifest(&store, &options.product, &settings.data).await?;
-    let domain: Vec<u32> = storage::domain::read(&store, &manifest.domain)
-        .await?
-        .into_iter()
-        .map(u32::from)
-        .collect();
+    let cells = storage::domain::read_cells(&store, &manifest.domain).await?;
+    ensure!(
+        cells.map_count() == manifest.grid.cell_count(),
+        "{} does not fill its product's grid",
+        manifest.domain
+    );
+    let flags = cells.flags(0..cells.map_count());
+    let domain: Vec<u32> = flags.into_iter().map(u32::from).collect();
     let backend = deployment::backend(settings)?;
     let renderer = tokio::task::spawn_blocking(move || Renderer::new(backend)).await??;
     let display = manifest.quantity.display();

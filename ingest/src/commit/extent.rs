@@ -246,14 +246,16 @@ async fn look_for<'a>(
 /// The smallest window that holds those of some cells that lie in another one; none without any.
 fn around(cells: &Cells, grid: &Grid, all: Window) -> Option<Window> {
     let rows = all.row..all.row + all.rows;
-    let has = |row: u32, col: u32| cells.has(row as usize * grid.cols as usize + col as usize);
     let (mut north, mut south, mut west, mut east) = (u32::MAX, 0, u32::MAX, 0);
     for row in rows {
-        let mut cols = all.col..all.col + all.cols;
-        let Some(first) = cols.find(|col| has(row, *col)) else {
+        let row_start = row as usize * grid.cols as usize;
+        let start = row_start + all.col as usize;
+        let mut own = cells.within(start..start + all.cols as usize);
+        let Some(first) = own.next() else {
             continue;
         };
-        let last = cols.rev().find(|col| has(row, *col)).unwrap_or(first);
+        let last = own.next_back().unwrap_or(first);
+        let [first, last] = [first, last].map(|cell| (cell - row_start) as u32);
         (north, south) = (north.min(row), row);
         (west, east) = (west.min(first), east.max(last));
     }

@@ -1,4 +1,6 @@
-//! Which cells of a very large grid hold data in some step, a bit each, and how much of cells of its levels that is.
+//! Which cells of a very large grid hold data in some step, and how much of cells of its levels that is.
+
+use std::ops::Range;
 
 use contract::earth::Earth;
 use contract::grid::Grid;
@@ -27,11 +29,22 @@ impl Domain {
         self.grid == *grid
     }
 
-    /// How many of some cells side by side hold data.
-    fn count(&self, row: u32, cols: std::ops::Range<u32>) -> u32 {
-        let first = row as usize * self.grid.cols as usize;
-        let cells = first + cols.start as usize..first + cols.end as usize;
-        self.cells.count_in(cells) as u32
+    /// How many cells of a row hold data in each of some blocks side by side, of so many columns each.
+    fn counts(&self, row: u32, blocks: Range<u32>, across: u32) -> Vec<u32> {
+        let row_start = row as usize * self.grid.cols as usize;
+        let cell = |block: u32| row_start + (block * across).min(self.grid.cols) as usize;
+        let (first, across) = (cell(blocks.start), across as usize);
+        let mut counts = vec![0; blocks.len()];
+        for run in self.cells.runs(first..cell(blocks.end)) {
+            let (mut at, end) = (run.start - first, run.end - first);
+            while at < end {
+                let block = at / across;
+                let next = ((block + 1) * across).min(end);
+                counts[block] += (next - at) as u32;
+                at = next;
+            }
+        }
+        counts
     }
 
     /// How much of every cell of a window holds data, `[row, col]`, of [`COVERED`]: what holds any keeps some. A cell at the edge of
@@ -46,23 +59,27 @@ impl Domain {
         } = choice;
         let mut shares = Vec::with_capacity(window.cell_count());
         for row in *first_row..first_row + window.rows {
-            let rows = row * down..((row + 1) * down).min(self.grid.rows);
-            let areas: Vec<f64> = rows
-                .clone()
-                .map(|row| self.grid.cell_area_m2(row, EARTH))
-                .collect();
-            let block_m2 = whole.cell_area_m2(row, EARTH);
-            for col in *first_col..first_col + window.cols {
-                let col = col % whole.cols;
-                let cols = col * across..((col + 1) * across).min(self.grid.cols);
-                let covered = rows
-                    .clone()
-                    .zip(&areas)
-                    .map(|(row, area_m2)| f64::from(self.count(row, cols.clone())) * area_m2);
-                let covered_m2: f64 = covered.sum();
-                let share = (covered_m2 / block_m2 * f64::from(COVERED)).round() as u32;
-                shares.push(share.clamp(u32::from(covered_m2 > 0.0), COVERED));
+            let mut covered_m2 = vec![0.0; window.cols as usize];
+            for row in row * down..((row + 1) * down).min(self.grid.rows) {
+                let area_m2 = self.grid.cell_area_m2(row, EARTH);
+                let mut left = &mut covered_m2[..];
+                let mut col = *first_col;
+                while !left.is_empty() {
+                    let first = col % whole.cols;
+                    let count = (whole.cols - first).min(left.len() as u32);
+                    let (own, others) = left.split_at_mut(count as usize);
+                    let counts = self.counts(row, first..first + count, *across);
+                    for (covered_m2, count) in own.iter_mut().zip(counts) {
+                        *covered_m2 += f64::from(count) * area_m2;
+                    }
+                    (left, col) = (others, col + count);
+                }
             }
+            let block_m2 = whole.cell_area_m2(row, EARTH);
+            shares.extend(covered_m2.into_iter().map(|covered_m2| {
+                let share = (covered_m2 / block_m2 * f64::from(COVERED)).round() as u32;
+                share.clamp(u32::from(covered_m2 > 0.0), COVERED)
+            }));
         }
         shares
     }
@@ -89,16 +106,25 @@ mod tests {
             .filter(|cell| has_data(*cell))
             .for_each(|cell| cells.insert(cell));
         let domain = Domain::of(&GRID, cells).unwrap();
-        for (row, cols) in [
-            (0, 0..200),
-            (1, 63..65),
-            (2, 1..130),
-            (1, 5..5),
-            (2, 128..200),
+        for (row, blocks, across) in [
+            (0, 0..200, 1),
+            (1, 0..50, 4),
+            (2, 3..13, 16),
+            (2, 0..13, 16),
+            (1, 5..5, 16),
+            (2, 63..65, 1),
         ] {
-            let own = cols.clone().map(|col| (row * 200 + col) as usize);
-            let count = own.filter(|cell| has_data(*cell)).count() as u32;
-            assert_eq!(domain.count(row, cols.clone()), count, "{row} {cols:?}");
+            let of_block = |block: u32| {
+                let own = block * across..((block + 1) * across).min(200);
+                let own = own.map(|col| (row * 200 + col) as usize);
+                own.filter(|cell| has_data(*cell)).count() as u32
+            };
+            let counts: Vec<u32> = blocks.clone().map(of_block).collect();
+            assert_eq!(
+                domain.counts(row, blocks.clone(), across),
+                counts,
+                "{row} {blocks:?} {across}"
+            );
         }
         assert!(Domain::of(&GRID, Cells::none(599)).is_none());
     }

@@ -39,7 +39,7 @@ const MOST_FILLED_CELLS: usize = 1 << 22;
 const MOST_WINDOW_CELLS: u64 = 1 << 27;
 /// Filled levels that are kept, each of 32 MiB at most.
 const MOST_COARSE: usize = 8;
-/// Domains that are kept, each of a bit a cell.
+/// Domains that are kept, each of a bit a cell at most.
 const MOST_DOMAINS: usize = 4;
 
 /// Makes scenes.

@@ -13,6 +13,7 @@ use render::stages::layout::is_missing;
 use render::{Backend, RenderError, Renderer, pyramid};
 use render_worker::{DrawError, Limits, Source};
 use storage::Store;
+use storage::domain::Cells;
 
 use crate::here::Here;
 use crate::scenes::{FIVE_DEGREES, ONE_DEGREE};
@@ -123,6 +124,9 @@ async fn jobs_that_name_what_is_not_there_are_refused() {
         &[vec![1.0, 2.0]],
     )
     .await;
+    // A few bytes that stand for 2^31 cells.
+    let none = Cells::none(1 << 31);
+    let vast = storage::domain::write_cells(&store, &flux.product, none).await;
     let service = Here::new(store, Backend::Cpu);
     let mut unknown = job.clone();
     unknown.value.domain = "domain/nothing/0".parse().unwrap();
@@ -133,7 +137,9 @@ async fn jobs_that_name_what_is_not_there_are_refused() {
     mismatched.accumulated = small.time_sample("2000-01-30".parse().unwrap());
     let mut wider = job.clone();
     (wider.grid.rows, wider.grid.dlat_deg) = (1 << 20, 1e-4);
-    for wrong in [mismatched, wider] {
+    let mut of_many = job.clone();
+    of_many.value.domain = vast.unwrap();
+    for wrong in [mismatched, wider, of_many] {
         let refused = service.draw(&wrong).await.unwrap_err();
         let expected = matches!(
             *refused,

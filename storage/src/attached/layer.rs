@@ -294,7 +294,7 @@ fn answer(meta: ObjectMeta, content: &Content, options: &GetOptions) -> Result<G
     };
     let piece_bytes = match content {
         Content::Bytes(_) => meta.size.max(1),
-        Content::File(..) | Content::Made(..) => PIECE_BYTES,
+        Content::File(..) => PIECE_BYTES,
     };
     let asked = if options.head { 0..0 } else { range.clone() };
     let end = asked.end;

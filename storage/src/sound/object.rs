@@ -7,9 +7,9 @@ use contract::topic::Origin;
 use parquet::file::metadata::ParquetMetaDataReader;
 
 use super::{DOCUMENTS, Soundness, check_document, damage, of_bytes};
-use crate::{StorageError, contributed, fields};
+use crate::{StorageError, contributed, domain, fields};
 
-/// All that can be known of an object from itself: its bytes, and its values where these name it.
+/// All that can be known of an object from itself: its bytes, its values where these name it, and what a domain says of itself.
 pub fn of_object(key: &ObjectKey, content: &Bytes) -> Result<Soundness, StorageError> {
     let found = of_bytes(key, content)?;
     match (key.vouches(), Kind::of(key)) {
@@ -19,6 +19,7 @@ pub fn of_object(key: &ObjectKey, content: &Bytes) -> Result<Soundness, StorageE
             contributed::check(key, content.clone())?;
         }
         (Vouched::Values(_), _) => fields::check_values(key, content.clone())?,
+        (Vouched::Bytes(_), Some(Kind::Domain)) => domain::check(key, content)?,
         (Vouched::Nothing, Some(kind)) if DOCUMENTS.contains(&kind) => {
             check_document(key, content, found)?;
         }

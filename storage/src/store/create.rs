@@ -156,9 +156,7 @@ impl Store {
             (Place::Cloud, _) if content.size_bytes() > WHOLE_BYTES && is_named => {
                 self.send_parts(key, content).await
             }
-            (Place::Hdfs, Content::File(..) | Content::Made(..)) if is_named => {
-                self.send_parts(key, content).await
-            }
+            (Place::Hdfs, Content::File(..)) if is_named => self.send_parts(key, content).await,
             (Place::Cloud | Place::Hdfs | Place::Memory, _) => {
                 let options = PutOptions::from(PutMode::Create);
                 let whole = content.whole().map_err(|e| folder::failed(key, e))?;

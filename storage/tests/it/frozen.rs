@@ -204,7 +204,7 @@ async fn write(store: &Store) -> Manifest {
         source: "made by a test".to_owned(),
         grid: GRID,
         steps,
-        domain: domain::write(store, &product(), &cells).await.unwrap(),
+        domain: domain_of_then(store, &cells).await,
         series: vec![SeriesSegment {
             first_step: 0,
             steps: 2,
@@ -226,6 +226,14 @@ async fn write(store: &Store) -> Manifest {
     let manifest = revised(manifest);
     manifests::commit(store, &manifest).await.unwrap();
     manifest
+}
+
+/// Stores a domain as it was stored when version 2 was frozen: a byte a cell.
+async fn domain_of_then(store: &Store, cells: &[bool]) -> ObjectKey {
+    let bytes: Vec<u8> = cells.iter().map(|&cell| u8::from(cell)).collect();
+    let key = ObjectKey::domain(&product(), &Digest::of(&bytes));
+    store.put_new(&key, bytes.into()).await.unwrap();
+    key
 }
 
 /// Why the first version is kept.
@@ -309,6 +317,26 @@ async fn what_is_written_now_is_named_as_in_the_newest_frozen_store() {
         MANIFEST_SCHEMA,
         "freeze weights of the new layout too"
     );
+}
+
+#[tokio::test]
+async fn a_frozen_domain_is_the_one_that_is_written_now_of_the_cells_of_before() {
+    let (_folder, before) = copy(2);
+    let manifest = manifests::latest(&before, &product()).await;
+    let key = manifest.unwrap().unwrap().domain;
+    let bytes = before.get(&key).await.unwrap();
+    assert_eq!(bytes.len(), GRID.cell_count(), "a byte a cell");
+    let cells = domain::read(&before, &key).await.unwrap();
+    if let Some(folder) = to_freeze() {
+        let store = Store::open(folder.join("domains").to_str().unwrap()).unwrap();
+        domain::write(&store, &product(), &cells).await.unwrap();
+    }
+    let folder = copy_of(2, "domains");
+    let kept = Store::open(folder.path().to_str().unwrap()).unwrap();
+    let keys = kept.list("domain/fgco2").await.unwrap();
+    assert_eq!(domain::read(&kept, &keys[0]).await.unwrap(), cells);
+    let now = domain::write(&Store::memory(), &product(), &cells).await;
+    assert_eq!(keys, [now.unwrap()]);
 }
 
 #[tokio::test]
