@@ -81,6 +81,22 @@ impl Kind {
             Self::Other => "of another type".to_owned(),
         }
     }
+
+    /// What NetCDF fills a variable with that has no fill value of its own; of bytes every value may be meant, and floating-point
+    /// numbers as large are values of nothing.
+    pub(crate) fn netcdf_fill(self) -> Option<f64> {
+        match self {
+            Self::Integer(2) => Some(-32_767.0),
+            Self::Integer(4) => Some(-2_147_483_647.0),
+            Self::Integer(8) => Some(-9_223_372_036_854_775_806.0),
+            Self::Unsigned(2) => Some(65_535.0),
+            Self::Unsigned(4) => Some(4_294_967_295.0),
+            Self::Unsigned(8) => Some(18_446_744_073_709_551_614.0),
+            Self::Integer(_) | Self::Unsigned(_) | Self::Float(_) | Self::Text(_) | Self::Other => {
+                None
+            }
+        }
+    }
 }
 
 /// Attributes by name.
