@@ -189,6 +189,7 @@ pub(crate) fn describe(foreign: &Foreign, indexes: &Indexes) -> Result<Descripti
             .map(|array| variable(array, indexes))
             .collect(),
         library_bytes: 0,
+        groups: vec![],
     })
 }
 
