@@ -226,11 +226,12 @@ fn variable(array: &ForeignArray, indexes: &Indexes) -> Variable {
 /// that value and not the one that NetCDF fills variables with: where they are two, no number stands for no data.
 fn stated_fill(kind: Kind, fill: Option<f64>, is_zarr2: bool) -> Option<AttributeValue> {
     let fill = fill?;
-    let is_usual = kind.netcdf_fill() == Some(fill);
-    let bits = match is_zarr2 {
-        true => vec![fill.into()],
-        false if is_usual => return None,
-        false => vec![],
+    let bits = if is_zarr2 {
+        vec![fill.into()]
+    } else if kind.netcdf_fill() == Some(fill) {
+        return None;
+    } else {
+        vec![]
     };
     Some(AttributeValue::Numbers { kind, bits })
 }
