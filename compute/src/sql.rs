@@ -34,6 +34,7 @@ mod substituted;
 mod tables;
 mod told;
 mod version;
+mod whole_sums;
 mod worked_out;
 mod yielding;
 

@@ -205,31 +205,13 @@ async fn compare_rows(
 
 #[cfg(test)]
 mod tests {
-    use contract::grid::Grid;
     use contract::quantity::Quantity;
     use contract::time::Period;
     use storage::Store;
 
     use super::*;
-    use crate::{At, Description, Edit, WholeField};
-
-    /// Three rows of two chunks.
-    const GRID: Grid = Grid {
-        rows: 1030,
-        cols: 600,
-        north_deg: 80.0,
-        west_deg: 0.0,
-        dlat_deg: 0.125,
-        dlon_deg: 0.125,
-    };
-
-    fn values() -> Vec<f32> {
-        let value = |cell: usize| match cell % 11 {
-            0 => f32::NAN,
-            _ => cell as f32,
-        };
-        (0..GRID.cell_count()).map(value).collect()
-    }
+    use crate::banded_field::{GRID, description, values};
+    use crate::{At, Edit, WholeField};
 
     /// The same with another value in the last cell, which lies in the last band.
     fn other_values() -> Vec<f32> {
@@ -240,16 +222,7 @@ mod tests {
 
     /// A cube of a step of some values that says a digest.
     async fn repository_of(store: &Store, values: Vec<f32>, values_sha256: Digest) -> Repository {
-        let description = Description {
-            product: "p".parse().unwrap(),
-            title: "P".to_owned(),
-            quantity: Quantity::SeaSurfaceTemperature,
-            synthetic: true,
-            source: "a test".to_owned(),
-            grid: GRID,
-            version: None,
-            statistic: None,
-        };
+        let description = description(Quantity::SeaSurfaceTemperature);
         let repository = Repository::create(store, "p", &description).await.unwrap();
         let mut edit = Edit::begin(&repository).await.unwrap();
         let mut bands = WholeField::new(values.into(), GRID.cols);

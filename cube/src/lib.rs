@@ -9,6 +9,8 @@ mod arrays;
 mod at_hand;
 mod axis;
 mod background;
+#[cfg(test)]
+mod banded_field;
 mod bands;
 mod blocks;
 pub mod cf;

@@ -315,41 +315,14 @@ async fn first_difference(
 mod tests {
     use std::sync::Arc;
 
-    use contract::grid::Grid;
     use contract::quantity::Quantity;
 
     use super::*;
     use crate::Edit;
-
-    /// Eighteen rows of chunks of a field, and three of a cube's: none of their edges is one of the other's.
-    const GRID: Grid = Grid {
-        rows: 1030,
-        cols: 600,
-        north_deg: 80.0,
-        west_deg: 0.0,
-        dlat_deg: 0.125,
-        dlon_deg: 0.125,
-    };
-
-    fn values() -> Vec<f32> {
-        let value = |cell: usize| match cell % 11 {
-            0 => f32::NAN,
-            _ => cell as f32,
-        };
-        (0..GRID.cell_count()).map(value).collect()
-    }
+    use crate::banded_field::{GRID, description, values};
 
     async fn cube_of(store: &Store, values: Vec<f32>, period: Period) -> Cube {
-        let description = Description {
-            product: "p".parse().unwrap(),
-            title: "P".to_owned(),
-            quantity: Quantity::CarbonFlux,
-            synthetic: true,
-            source: "a test".to_owned(),
-            grid: GRID,
-            version: None,
-            statistic: None,
-        };
+        let description = description(Quantity::CarbonFlux);
         let repository = Repository::create(store, "cubes/p", &description).await;
         let repository = repository.unwrap();
         let mut edit = Edit::begin(&repository).await.unwrap();

@@ -79,16 +79,15 @@ mod tests {
     use std::sync::atomic::{AtomicUsize, Ordering};
 
     use async_trait::async_trait;
-    use contract::grid::Grid;
-    use contract::quantity::Quantity;
     use storage::Store;
     use zarrs::storage::byte_range::ByteRangeIterator;
     use zarrs::storage::{AsyncMaybeBytesIterator, MaybeBytes, StorageError, StoreKey};
     use zarrs_icechunk::AsyncIcechunkStore;
 
     use super::*;
+    use crate::Repository;
+    use crate::description::tests::description;
     use crate::group::write_group;
-    use crate::{Description, Repository};
 
     /// A store that answers a moment later, and knows how many wait for it at most.
     struct Later {
@@ -126,23 +125,7 @@ mod tests {
 
     #[tokio::test]
     async fn chunks_of_digests_are_read_side_by_side_and_stay_in_their_order() {
-        let description = Description {
-            product: "p".parse().unwrap(),
-            title: "P".to_owned(),
-            quantity: Quantity::CarbonFlux,
-            synthetic: true,
-            source: "a test".to_owned(),
-            grid: Grid {
-                rows: 4,
-                cols: 8,
-                north_deg: 90.0,
-                west_deg: -180.0,
-                dlat_deg: 45.0,
-                dlon_deg: 45.0,
-            },
-            version: None,
-            statistic: None,
-        };
+        let description = description();
         let made = Repository::create(&Store::memory(), "p", &description).await;
         let session = made.unwrap().session().await.unwrap();
         let inner = Arc::new(AsyncIcechunkStore::from(session));

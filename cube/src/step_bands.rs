@@ -73,49 +73,20 @@ impl StepBands {
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
-
-    use contract::grid::Grid;
     use contract::quantity::Quantity;
     use contract::time::Period;
     use storage::Store;
 
     use super::*;
-    use crate::{At, Description, Edit, Repository, WholeField};
-
-    /// Three rows of two chunks.
-    const GRID: Grid = Grid {
-        rows: 1030,
-        cols: 600,
-        north_deg: 80.0,
-        west_deg: 0.0,
-        dlat_deg: 0.125,
-        dlon_deg: 0.125,
-    };
-
-    fn values() -> Arc<[f32]> {
-        let value = |cell: usize| match cell % 11 {
-            0 => f32::NAN,
-            _ => cell as f32,
-        };
-        (0..GRID.cell_count()).map(value).collect()
-    }
+    use crate::banded_field::{GRID, description, values};
+    use crate::{At, Edit, Repository, WholeField};
 
     /// A cube of a step of these values that says this digest.
     async fn cube_of(store: &Store, values_sha256: Digest) -> Cube {
-        let description = Description {
-            product: "p".parse().unwrap(),
-            title: "P".to_owned(),
-            quantity: Quantity::CarbonFlux,
-            synthetic: true,
-            source: "a test".to_owned(),
-            grid: GRID,
-            version: None,
-            statistic: None,
-        };
+        let description = description(Quantity::CarbonFlux);
         let repository = Repository::create(store, "p", &description).await.unwrap();
         let mut edit = Edit::begin(&repository).await.unwrap();
-        let mut bands = WholeField::new(values(), GRID.cols);
+        let mut bands = WholeField::new(values().into(), GRID.cols);
         let period = Period::month(2000, 1).unwrap();
         let put = edit.put_bands(period, values_sha256, &mut bands);
         put.await.unwrap();

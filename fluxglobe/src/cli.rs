@@ -3,6 +3,7 @@
 mod analysis;
 mod annotations;
 mod attach;
+mod brokers;
 mod budget;
 mod degrees;
 mod derive;
@@ -602,6 +603,45 @@ mod tests {
         let (own, shared) = help.split_once("Options of every command:").unwrap();
         assert!(own.contains("--json") && !own.contains("--data"), "{help}");
         assert!(shared.contains("--data") && !shared.contains("--json"));
+    }
+
+    #[test]
+    fn seasons_are_taken_off_by_either_spelling() {
+        for words in [
+            "derive statistic --product a --statistic correlation --with b",
+            "stats correlate --product a --product b --at 10,20",
+        ] {
+            let words = format!("fluxglobe {words} --deseasonalize");
+            let read = Cli::try_parse_from(words.split(' '));
+            assert!(read.is_ok(), "{words}: {}", read.unwrap_err());
+        }
+    }
+
+    /// Twelve settings of Kafka between a command's own options and its examples hid both.
+    #[test]
+    fn what_is_derived_shows_of_kafka_the_brokers_alone_and_takes_all() {
+        let mut program = Cli::command();
+        program.build();
+        for words in [
+            "derive",
+            "derive accumulated",
+            "derive co2-flux",
+            "derive regrid",
+            "derive statistic",
+        ] {
+            let command = words.split(' ').fold(&program, |command, name| {
+                command.find_subcommand(name).unwrap()
+            });
+            let help = command.clone().render_long_help().to_string();
+            assert_eq!(help.matches("--kafka").count(), 1, "{words}: {help}");
+            assert!(help.contains("--kafka <SERVERS>"), "{words}: {help}");
+            assert!(help.contains("ingestd"), "{words}: {help}");
+        }
+        let ingestd = program.find_subcommand_mut("ingestd").unwrap();
+        let help = ingestd.render_long_help().to_string();
+        assert!(help.contains("--kafka-security"), "{help}");
+        let words = "fluxglobe derive accumulated --product a --kafka h:9092 --kafka-user b";
+        assert!(Cli::try_parse_from(words.split(' ')).is_ok());
     }
 
     #[test]

@@ -1,9 +1,13 @@
-//! Numbers for people: so many decimals where these say something, figures and size where they do not, and places.
+//! Numbers for people: so many decimals where these say something, figures and size where they do not, areas, and places.
 
 use contract::series::Cell;
 
 /// Longitudes and latitudes are told to so many parts of a degree: some 10 m.
 const PARTS_PER_DEGREE: f64 = 1e4;
+const M2_PER_KM2: f64 = 1e6;
+const M2_PER_MILLION_KM2: f64 = 1e12;
+/// A tenth of a million km², below which three decimals of a million are two figures and less.
+const SMALL_M2: f64 = 0.1 * M2_PER_MILLION_KM2;
 
 /// A number with so many decimals; one of which they would show little but zeros, or a huge one, by its size: `-1.2345e-9`.
 pub(crate) fn figures(value: f64, decimals: usize) -> String {
@@ -13,6 +17,20 @@ pub(crate) fn figures(value: f64, decimals: usize) -> String {
         format!("{value:.decimals$e}")
     } else {
         format!("{value:.decimals$}")
+    }
+}
+
+/// Millions of square kilometres with three decimals; what rounding leaves of nothing is nothing, and not below it.
+pub(crate) fn million_km2(m2: f64) -> String {
+    format!("{:.3}", (m2 / M2_PER_MILLION_KM2 * 1e3).round() / 1e3 + 0.0)
+}
+
+/// An area with its unit: `510.066 10⁶ km²`, and `12.500 km²` where three decimals of a million would show little of it.
+pub(crate) fn area(m2: f64) -> String {
+    if m2 < SMALL_M2 {
+        format!("{} km²", figures(m2 / M2_PER_KM2, 3))
+    } else {
+        format!("{} 10⁶ km²", million_km2(m2))
     }
 }
 
@@ -49,6 +67,26 @@ mod tests {
         ];
         assert_eq!(texts, expected);
         assert_eq!(figures(-0.000_12, 3), "-1.200e-4");
+    }
+
+    #[test]
+    fn nothing_has_no_sign() {
+        let texts = [5.1e14, 4e8, -3.0, -0.0].map(million_km2);
+        assert_eq!(texts, ["510.000", "0.000", "0.000", "0.000"]);
+    }
+
+    #[test]
+    fn an_area_has_the_unit_in_which_it_is_read() {
+        let texts = [5.100_656e14, 1e11, 1.25e10, 4e8, 12.0, 0.0].map(area);
+        let expected = [
+            "510.066 10⁶ km²",
+            "0.100 10⁶ km²",
+            "12500.000 km²",
+            "400.000 km²",
+            "1.200e-5 km²",
+            "0.000 km²",
+        ];
+        assert_eq!(texts, expected);
     }
 
     #[test]

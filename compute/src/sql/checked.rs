@@ -1,4 +1,4 @@
-//! Sums, differences and products of whole numbers that a question computes: as the engine has them in, which goes on from the other end where a number
+//! Sums, differences, products and opposites of whole numbers that a question computes: as the engine has them in, which goes on from the other end where a number
 //! leaves its type; as functions that refuse that out.
 
 use std::sync::Arc;
@@ -9,7 +9,7 @@ use datafusion::arrow::datatypes::{DataType, Field, FieldRef};
 use datafusion::arrow::error::ArrowError;
 use datafusion::common::config::ConfigOptions;
 use datafusion::common::tree_node::Transformed;
-use datafusion::common::{DFSchema, Result, internal_err};
+use datafusion::common::{DFSchema, Result, ScalarValue, internal_err};
 use datafusion::error::DataFusionError;
 use datafusion::logical_expr::expr::ScalarFunction;
 use datafusion::logical_expr::expr_rewriter::FunctionRewrite;
@@ -40,8 +40,15 @@ impl FunctionRewrite for Checked {
         schema: &DFSchema,
         _settings: &ConfigOptions,
     ) -> Result<Transformed<Expr>> {
-        let Expr::BinaryExpr(BinaryExpr { left, op, right }) = expr else {
-            return Ok(Transformed::no(expr));
+        let (left, op, right) = match expr {
+            Expr::BinaryExpr(BinaryExpr { left, op, right }) => (left, op, right),
+            Expr::Negative(number) if is_whole(&number, schema) => {
+                let zero = ScalarValue::new_zero(&number.get_type(schema)?)?;
+                let function = ScalarUDF::from(WholeNumbers::opposite());
+                let call = function.call(vec![Expr::Literal(zero, None), *number]);
+                return Ok(Transformed::yes(call));
+            }
+            other => return Ok(Transformed::no(other)),
         };
         let is_checked = matches!(op, Operator::Plus | Operator::Minus | Operator::Multiply);
         if !(is_checked && is_whole(&left, schema) && is_whole(&right, schema)) {
@@ -49,7 +56,7 @@ impl FunctionRewrite for Checked {
             return Ok(Transformed::no(Expr::BinaryExpr(expr)));
         }
         let (mut ops, mut numbers) = match *left {
-            Expr::ScalarFunction(call) if chained(&call).is_some() => {
+            Expr::ScalarFunction(call) if chained(&call).is_some_and(|own| !own.is_opposite) => {
                 let ops = chained(&call).map_or_else(Vec::new, |own| own.ops.clone());
                 (ops, call.args)
             }
@@ -81,6 +88,8 @@ fn chained(call: &ScalarFunction) -> Option<&WholeNumbers> {
 struct WholeNumbers {
     /// One less than numbers.
     ops: Vec<Operator>,
+    /// Is it a number with the sign turned: 0 less that?
+    is_opposite: bool,
     signature: Signature,
 }
 
@@ -89,6 +98,14 @@ impl WholeNumbers {
         Self {
             signature: Signature::any(ops.len() + 1, Volatility::Immutable),
             ops,
+            is_opposite: false,
+        }
+    }
+
+    fn opposite() -> Self {
+        Self {
+            is_opposite: true,
+            ..Self::new(vec![Operator::Minus])
         }
     }
 }
@@ -100,6 +117,9 @@ impl ScalarUDFImpl for WholeNumbers {
 
     /// What a column of the operators is called.
     fn schema_name(&self, numbers: &[Expr]) -> Result<String> {
+        if let (true, [_zero, number]) = (self.is_opposite, numbers) {
+            return Ok(format!("(- {})", number.schema_name()));
+        }
         let names = numbers.iter().map(|own| own.schema_name().to_string());
         let ops = self.ops.iter().map(|op| format!(" {op} "));
         let parts = std::iter::once(String::new()).chain(ops).zip(names);

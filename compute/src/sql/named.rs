@@ -1,6 +1,6 @@
 //! Names of tables that are products: which product, and which of its versions.
 
-use contract::manifest::Manifest;
+use contract::manifest::{AskedVersion, Manifest};
 use contract::product::ProductId;
 use contract::region::MaskCode;
 use storage::manifests;
@@ -19,20 +19,18 @@ pub(super) struct Named {
 impl Named {
     /// `name`, `name@12` or `name@12-0a1b2c3d`; `_` stands for `-` in the name, so that it needs no quotes.
     pub(super) fn of(text: &str) -> Option<Self> {
-        let (product, version) = match text.split_once('@') {
-            Some((product, version)) => (product, Some(version)),
-            None => (text, None),
+        let text = match text.split_once('@') {
+            Some((product, version)) => format!("{}@{version}", product.replace('_', "-")),
+            None => text.replace('_', "-"),
         };
-        let (number, digest) = match version {
-            Some(version) => match version.split_once('-') {
-                Some((number, digest)) => (Some(number), Some(digest.to_owned())),
-                None => (Some(version), None),
-            },
-            None => (None, None),
-        };
+        let AskedVersion {
+            product,
+            number,
+            digest,
+        } = text.parse().ok()?;
         Some(Self {
-            product: product.replace('_', "-").parse().ok()?,
-            number: number.map(str::parse).transpose().ok()?,
+            product,
+            number,
             digest,
         })
     }
@@ -106,7 +104,7 @@ mod tests {
         assert_eq!(of("a-b@12"), Some((p.clone(), Some(12), None)));
         let digest = Some("0a1b2c3d".to_owned());
         assert_eq!(of("a-b@12-0a1b2c3d"), Some((p, Some(12), digest)));
-        for wrong in ["a-b@", "a-b@x", "../a", "A", ""] {
+        for wrong in ["a-b@", "a-b@x", "a-b@012", "a-b@+1", "../a", "A", ""] {
             assert_eq!(of(wrong), None, "{wrong}");
         }
     }

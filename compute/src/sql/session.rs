@@ -31,6 +31,7 @@ use super::running::{Rows, Turn};
 use super::statement::{LARGE, statement};
 use super::tables::Tables;
 use super::told::told;
+use super::whole_sums::CheckedSum;
 use super::worked_out::AnswerFunction;
 use super::yielding::Yielding;
 use super::{analysis, batches, budget, checked, compared, joined, statistics, substituted};
@@ -80,7 +81,9 @@ impl Sql {
             functions.retain(|it| !LARGE.contains(&it.name()));
         }
         if let Some(functions) = builder.aggregate_functions() {
-            functions.push(Arc::new(AggregateUDF::from(MeanWeighted::new())));
+            let sum = AggregateUDF::from(CheckedSum::default());
+            functions.retain(|it| it.name() != sum.name());
+            functions.extend([sum, MeanWeighted::new().into()].map(Arc::new));
         }
         let builder = builder
             .with_analyzer_rule(checked::rule())

@@ -803,6 +803,60 @@ async fn whole_numbers_that_leave_their_type_are_refused_and_all_others_are_comp
     assert_eq!(one(&sql, &chained).await, "490");
 }
 
+/// A sum of a largest number and 1 was the smallest, and so was the opposite of that.
+#[tokio::test(flavor = "multi_thread")]
+async fn sums_and_opposites_of_whole_numbers_that_leave_their_type_are_refused() {
+    let (_folder, store) = folder_store();
+    let sql = sql_of(&Engine::in_process(store, parts(2)));
+    let of = "FROM (VALUES (1, 9223372036854775807), (1, 1), (2, 3), (2, NULL)) AS v(m, n)";
+    let smallest = "CAST('-9223372036854775808' AS BIGINT)";
+    for text in [
+        format!("SELECT sum(n) {of}"),
+        format!("SELECT m, sum(n) {of} GROUP BY m"),
+        format!("SELECT sum(DISTINCT n) {of}"),
+        format!("SELECT sum(n) OVER (ORDER BY m, n) {of}"),
+        format!("SELECT sum(CAST('18446744073709551615' AS BIGINT UNSIGNED)) {of}"),
+        format!("SELECT -({smallest})"),
+        format!("SELECT -n FROM (VALUES ({smallest}), (1)) AS v(n)"),
+    ] {
+        let error = ask(&sql, &text).await.unwrap_err();
+        assert!(!error.is_retryable(), "{text}: {error}");
+        let told = error.to_string();
+        assert!(told.contains("do not hold what comes of this"), "{told}");
+    }
+    // What comes back into its type on the way is a sum like any other.
+    let back = "SELECT sum(n), sum(DISTINCT n), sum(n) FILTER (WHERE n > 1), sum(n) FILTER (WHERE n > 9223372036854775807)
+        FROM (VALUES (9223372036854775807), (1), (-2), (-2)) AS v(n)";
+    let all = "9223372036854775804";
+    let distinct = "9223372036854775806";
+    assert_eq!(
+        texts(&sql, back).await,
+        [[all, distinct, "9223372036854775807", ""]]
+    );
+    let grouped = format!("SELECT -m, sum(-m), sum(n) {of} WHERE n < 9 GROUP BY -m ORDER BY -m");
+    assert_eq!(
+        texts(&sql, &grouped).await,
+        [["-2", "-2", "3"], ["-1", "-1", "1"]]
+    );
+    let sliding = "SELECT sum(n) OVER (ORDER BY n ROWS 1 PRECEDING) FROM (VALUES (1), (2), (4)) AS v(n) ORDER BY n";
+    assert_eq!(texts(&sql, sliding).await, [["1"], ["3"], ["6"]]);
+    assert_eq!(one(&sql, "SELECT -(2 + 3) + 1").await, "-4");
+    assert_eq!(
+        one(&sql, &format!("SELECT sum(n * 1.0e0) {of}")).await,
+        "9.223372036854776e18"
+    );
+    let batch = ask(
+        &sql,
+        "SELECT sum(n), -n FROM (VALUES (3)) AS v(n) GROUP BY n",
+    );
+    let batch = batch.await.unwrap();
+    let fields = batch.schema_ref().fields().iter();
+    let told: Vec<String> = fields
+        .map(|f| format!("{} {}", f.name(), f.data_type()))
+        .collect();
+    assert_eq!(told, ["sum(v.n) Int64", "(- v.n) Int64"]);
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn a_question_that_never_ends_is_ended_and_so_is_one_that_nobody_waits_for() {
     let (_folder, store) = folder_store();

@@ -2,6 +2,7 @@
 
 use std::fmt::{Display, Formatter};
 
+use super::id::version_number;
 use super::{Manifest, ManifestId};
 use crate::ContractError;
 use crate::product::ProductId;
@@ -61,18 +62,20 @@ impl std::str::FromStr for AskedVersion {
             Some((number, digest)) => (number, Some(digest.to_owned())),
             None => (version, None),
         };
-        let is_number = !number.is_empty() && number.bytes().all(|b| b.is_ascii_digit());
         let is_digest = |text: &String| {
             text.len() == 8 && text.bytes().all(|b| matches!(b, b'0'..=b'9' | b'a'..=b'f'))
         };
-        let number = number.parse().ok().filter(|_| is_number);
-        if number.is_none() || digest.as_ref().is_some_and(|digest| !is_digest(digest)) {
-            let reason = "give NAME@12 or NAME@12-0a1b2c3d";
-            return Err(ContractError::invalid("version", text, reason));
+        let bad = |advice: Option<String>| {
+            let reason = advice.unwrap_or_else(|| "give NAME@12 or NAME@12-0a1b2c3d".to_owned());
+            ContractError::invalid("version", text, reason)
+        };
+        let number = version_number(number).map_err(bad)?;
+        if digest.as_ref().is_some_and(|digest| !is_digest(digest)) {
+            return Err(bad(None));
         }
         Ok(Self {
             product: product.parse()?,
-            number,
+            number: Some(number),
             digest,
         })
     }
@@ -109,8 +112,26 @@ mod tests {
             "p@1-0a1b2c3",
             "p@1-0A1B2C3D",
             "p@1@2",
+            "p@18446744073709551616",
         ] {
             assert!(parse(wrong).is_err(), "{wrong}");
         }
+    }
+
+    /// A version has one name: `01` is no second one of 1, in what is asked for as in what is stored.
+    #[test]
+    fn a_number_with_zeros_before_it_is_refused_with_the_one_to_write() {
+        let asked = |text: &str| text.parse::<AskedVersion>().map(drop);
+        let named = |text: &str| text.parse::<ManifestId>().map(drop);
+        for refused in [
+            asked("p@01"),
+            asked("p@001-0a1b2c3d"),
+            named("p@01-0a1b2c3d"),
+        ] {
+            let said = refused.unwrap_err().to_string();
+            assert!(said.contains("without zeros before it: @1"), "{said}");
+        }
+        assert!(named("p@+1-0a1b2c3d").is_err());
+        assert_eq!((asked("p@10"), named("p@10-0a1b2c3d")), (Ok(()), Ok(())));
     }
 }

@@ -56,11 +56,30 @@ impl std::str::FromStr for ManifestId {
         {
             return Err(bad());
         }
+        let number = version_number(number).map_err(|advice| {
+            advice.map_or_else(bad, |advice| ContractError::invalid("manifest", s, advice))
+        })?;
         Ok(Self {
             product: product.parse()?,
-            number: number.parse().map_err(|_not_a_number| bad())?,
+            number,
             short_sha256: short.to_owned(),
         })
+    }
+}
+
+/// The number of a version as its name has it: a version has one name, and an answer repeats it.
+///
+/// # Errors
+/// How the number is written, where the text is one that is written otherwise; nothing where it is none.
+pub(super) fn version_number(text: &str) -> Result<u64, Option<String>> {
+    let is_number = !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
+    let number: Option<u64> = text.parse().ok().filter(|_| is_number);
+    match number {
+        Some(number) if number.to_string() == text => Ok(number),
+        Some(number) => Err(Some(format!(
+            "write the number without zeros before it: @{number}"
+        ))),
+        None => Err(None),
     }
 }
 

@@ -2,6 +2,7 @@
 //!
 //! Every picture is a job like any other, so it is the same bytes wherever it is drawn and however often.
 
+mod duration;
 mod encoder;
 mod film;
 mod folder;
@@ -10,6 +11,7 @@ mod shots;
 mod strip;
 
 use std::sync::Arc;
+use std::time::Instant;
 
 use anyhow::{Context as _, Result, bail};
 use bytes::Bytes;
@@ -20,6 +22,7 @@ use contract::picture::shown_time;
 use contract::sun::SunChoice;
 use contract::time::TimeMs;
 use futures::stream::{self, StreamExt as _, TryStreamExt as _};
+use indicatif::ProgressBar;
 use prometheus::Registry;
 use render_worker::Limits;
 use render_worker::fleet::{Fleet, FleetSettings, LARGE_PIXELS};
@@ -30,6 +33,7 @@ use crate::cli::{RenderAnimation, Settings};
 use crate::picture::Extras;
 use crate::ports::{Drawer, FleetDrawer};
 use crate::{deployment, heights, picture, progress, sky};
+use duration::Pace;
 use film::Film;
 use path::CameraPath;
 use shots::Shots;
@@ -62,6 +66,7 @@ pub(crate) async fn run(settings: &Settings, store: Store, options: RenderAnimat
     let missing = film.missing(&shots)?;
     let bar = progress::bar("draw", shots.count().into());
     bar.inc(u64::from(shots.count()) - missing.len() as u64);
+    let mut pace = Pace::new(missing.len(), options.at_once);
     let drawn = stream::iter(missing)
         .map(|number| {
             let (drawer, shots) = (Arc::clone(&drawer), Arc::clone(&shots));
@@ -78,14 +83,18 @@ pub(crate) async fn run(settings: &Settings, store: Store, options: RenderAnimat
         // In order, whoever is done first.
         .buffered(usize::from(options.at_once));
     let drawn: Result<()> = drawn
-        .try_fold(&mut film, |film, (number, png): (u32, Bytes)| {
-            let bar = &bar;
-            async move {
-                film.add(number, png).await?;
-                bar.inc(1);
-                Ok(film)
-            }
-        })
+        .try_fold(
+            (&mut film, &mut pace),
+            |(film, pace), (number, png): (u32, Bytes)| {
+                let bar = &bar;
+                async move {
+                    film.add(number, png).await?;
+                    bar.inc(1);
+                    tell_rest(bar, pace);
+                    Ok((film, pace))
+                }
+            },
+        )
         .await
         .map(|_film| ());
     if let Err(error) = drawn {
@@ -96,6 +105,18 @@ pub(crate) async fn run(settings: &Settings, store: Store, options: RenderAnimat
     let outcome = format!("{} pictures, {bytes} bytes", shots.count());
     progress::done(&bar, &outcome);
     progress::result(&options.globe.picture.output.display().to_string())
+}
+
+/// Says how long the pictures to come take: beside the bar, and in one line where nobody sees a bar.
+fn tell_rest(bar: &ProgressBar, pace: &mut Pace) {
+    let Some(rest) = pace.picture(Instant::now()) else {
+        return;
+    };
+    let said = duration::left(rest);
+    if bar.is_hidden() && pace.is_told(rest) {
+        progress::say(&said);
+    }
+    bar.set_message(said);
 }
 
 async fn shots(settings: &Settings, store: &Store, options: &RenderAnimation) -> Result<Shots> {
@@ -189,6 +210,11 @@ async fn drawer(
     if options.render_workers.is_empty() {
         let limits = Limits::default();
         let desk = deployment::desk(settings, store, limits, &Registry::new()).await?;
+        let adapters = desk.pipeline().renderer().adapters();
+        let adapters = adapters.iter().map(|one| (one.name(), one.is_software()));
+        if let Some(note) = duration::note(adapters) {
+            progress::say(&note);
+        }
         return Ok(Arc::new(Drawer::new(desk)));
     }
     let fleet = FleetSettings {

@@ -119,7 +119,7 @@ pub(crate) struct StatsCorrelate {
     #[arg(long, value_name = STEPS)]
     pub(crate) step: Option<TimeStep>,
     /// Take the mean of each calendar month off both first: two series with seasons always go together.
-    #[arg(long)]
+    #[arg(long, visible_alias = "deseasonalize")]
     pub(crate) deseasonalise: bool,
     /// Least coverage, percent: steps of either that hold data over less of the region's sea, or of the line, are left out, and how many is
     /// said. 0 if absent.

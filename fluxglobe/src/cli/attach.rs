@@ -12,7 +12,8 @@ cannot be read rightly is refused. What is stored of it is the digest of its val
 the product then, a tile, a budget, a series, SQL or an export, has the values from there, and compares them with the digest: values that
 changed there since are an error and never a number. Nothing is written to the store that is attached.
 
-  Zarr 2, Zarr 3      a group: a folder, a part of a bucket (s3://, gs://, az://), or an address (http://, https://)
+  Zarr 2, Zarr 3      a group: a folder, a part of a bucket (s3://, gs://, az://), or an address (http://, https://); in
+                      file:///FOLDER signs are escaped as in other URLs (%20 is a space), in a folder's path they are not
   Icechunk            a repository, alike; what is read is the state that its branch main had when it was attached, whatever is
                       committed there later
 

@@ -9,6 +9,7 @@ use contract::product::ProductId;
 use contract::quantity::Quantity;
 use contract::time::TimeMs;
 
+use super::brokers::brokers_alone;
 use super::follow::Follow;
 
 /// `fluxglobe derive`.
@@ -55,6 +56,7 @@ pub(crate) enum DeriveWhat {
     ///
     /// A step without data adds nothing: a cell that has data later is at 0 before its first, and one that has none since the start holds none.
     /// How many steps a sum holds is stored beside it, and `fluxglobe stats point` prints it.
+    #[command(mut_args(brokers_alone))]
     Accumulated {
         /// Product, a carbon flux.
         #[arg(long)]
@@ -100,6 +102,7 @@ pub(crate) struct Expression {
 
 /// What every computed product may be told.
 #[derive(Debug, Args)]
+#[command(mut_args(brokers_alone))]
 pub(crate) struct About {
     /// Title of the product; made of what it is if absent.
     #[arg(long)]

@@ -9,6 +9,7 @@ use contract::product::ProductId;
 use contract::region::AskedRegion;
 use contract::time::{TimeMs, TimeStep};
 
+use super::brokers::brokers_alone;
 use super::follow::Follow;
 use super::steps::STEPS;
 
@@ -37,7 +38,7 @@ what it was. One that is made with --once stays as it is until it is asked for a
 
 /// `fluxglobe derive statistic`.
 #[derive(Debug, Args)]
-#[command(after_long_help = MORE)]
+#[command(after_long_help = MORE, mut_args(brokers_alone))]
 pub(crate) struct DeriveStatistic {
     /// Product, of any quantity.
     #[arg(long)]
@@ -63,7 +64,7 @@ pub(crate) struct DeriveStatistic {
     )]
     pub(crate) lag: Option<i32>,
     /// Take the mean of each calendar month off both products of a correlation first: two with seasons always go together.
-    #[arg(long, requires = "with")]
+    #[arg(long, visible_alias = "deseasonalize", requires = "with")]
     pub(crate) deseasonalise: bool,
     /// Means that trends are drawn through, and correlations and anomalies made of. Of trends steps as they are where those are longer;
     /// `native` correlations need the same periods of both. If absent months, and of anomalies every step.

@@ -19,9 +19,8 @@ use storage::manifests::{self, AtInstant};
 
 use super::statistics::{Form, csv};
 use crate::cli::{Budget, Settings};
+use crate::figures::million_km2;
 use crate::{deployment, progress};
-
-const M2_PER_MILLION_KM2: f64 = 1e12;
 
 pub(crate) async fn run(settings: &Settings, options: &Budget) -> Result<()> {
     let store = deployment::store(settings)?;
@@ -123,11 +122,6 @@ fn of_file(regions: Option<&str>, error: ContractError) -> ContractError {
         ) => ContractError::invalid(what, name, reason),
         (_, error) => error,
     }
-}
-
-/// Millions of square kilometres with three decimals; what rounding leaves of nothing is nothing, and not below it.
-fn million_km2(m2: f64) -> String {
-    format!("{:.3}", (m2 / M2_PER_MILLION_KM2 * 1e3).round() / 1e3 + 0.0)
 }
 
 fn say_what(answer: &BudgetAnswer) {
@@ -281,11 +275,5 @@ mod tests {
         assert_eq!(of_file(Some(asked), wrong()), wrong());
         let other = || ContractError::invalid("river flux", "650", "say where it is from");
         assert_eq!(of_file(Some("parts.geojson"), other()), other());
-    }
-
-    #[test]
-    fn nothing_has_no_sign() {
-        let texts = [5.1e14, 4e8, -3.0, -0.0].map(million_km2);
-        assert_eq!(texts, ["510.000", "0.000", "0.000", "0.000"]);
     }
 }

@@ -11,9 +11,11 @@ use export::answer::AnswerFormat;
 use storage::Store;
 
 use crate::cli::{PlotFile, Settings};
-use crate::figures::figures;
+use crate::figures::{area, figures};
 use crate::instants::Instants;
 use crate::{deployment, plot, progress};
+
+const M_PER_KM: f64 = 1e3;
 
 /// How an answer is printed.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -112,9 +114,14 @@ fn taken(answer: &StatisticsAnswer) -> String {
     if is_point(answer) {
         return format!("{} {}", answer.kind, answer.geometry);
     }
+    let size = match answer.size_unit.as_str() {
+        "m²" => area(answer.size),
+        "m" => format!("{} km", figures(answer.size / M_PER_KM, 3)),
+        unit => format!("{:.6e} {unit}", answer.size),
+    };
     format!(
-        "{} of {} ({:.6e} {}) on the {} earth",
-        answer.kind, answer.geometry, answer.size, answer.size_unit, answer.earth
+        "{} of {} ({size}) on the {} earth",
+        answer.kind, answer.geometry, answer.earth
     )
 }
 
@@ -209,7 +216,11 @@ mod tests {
         assert_eq!(of("point", "0,10", 1.0, "1"), "point 0,10");
         assert_eq!(
             of("area", "global", 5.1e14, "m²"),
-            "area of global (5.100000e14 m²) on the wgs84 earth"
+            "area of global (510.000 10⁶ km²) on the wgs84 earth"
+        );
+        assert_eq!(
+            of("line", "0,0;0,10", 1_105_854.8, "m"),
+            "line of 0,0;0,10 (1105.855 km) on the wgs84 earth"
         );
     }
 }

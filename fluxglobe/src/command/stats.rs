@@ -13,7 +13,7 @@ use contract::series::{PointSeries, RegionSeries};
 use contract::statistics::{PointQuestion, RegionQuestion, StatisticsWishes};
 
 use crate::cli::{Settings, Stats, StatsLine, StatsPoint, StatsPolygon};
-use crate::figures::{figures, middle};
+use crate::figures::{area, figures, middle, million_km2};
 use crate::instants::Instants;
 use crate::{deployment, plot, progress};
 
@@ -24,8 +24,6 @@ use super::statistics::{self, Form};
 
 /// Width of the longest bar, characters.
 const BAR_CHARS: f64 = 30.0;
-/// Square metres in a million square kilometres.
-const M2_PER_MILLION_KM2: f64 = 1e12;
 
 pub(crate) async fn run(settings: &Settings, which: Stats) -> Result<()> {
     match which {
@@ -189,10 +187,10 @@ async fn polygon(settings: &Settings, options: &StatsPolygon) -> Result<()> {
         Form::Table => progress::result(&region_table(&answer).trim_fmt())?,
     }
     progress::say(&format!(
-        "{}, mean over {} ({:.3} 10⁶ km²), each cell by its area on the {} earth; cite {}",
+        "{}, mean over {} ({}), each cell by its area on the {} earth; cite {}",
         answer.cited.titled(),
         answer.region,
-        answer.region_area_m2 / M2_PER_MILLION_KM2,
+        area(answer.region_area_m2),
         answer.earth,
         answer.cited.manifest
     ));
@@ -233,7 +231,7 @@ fn region_table(answer: &RegionSeries) -> Table {
             instants.text(step.end),
             mean.unwrap_or_else(|| "no data".to_owned()),
             format!("{:.1}", step.coverage_percent),
-            format!("{:.3}", step.area_m2 / M2_PER_MILLION_KM2),
+            million_km2(step.area_m2),
         ]);
     }
     table

@@ -189,6 +189,7 @@ pub(crate) fn describe(foreign: &Foreign, indexes: &Indexes) -> Result<Descripti
             .map(|array| variable(array, indexes))
             .collect(),
         library_bytes: 0,
+        groups: vec![],
     })
 }
 
@@ -200,13 +201,9 @@ fn variable(array: &ForeignArray, indexes: &Indexes) -> Variable {
         ArrayKind::Other => Kind::Other,
     };
     let mut attributes = attributes(&array.attributes, kind);
-    // Zarr version 2 has it where version 3 has a value for what was not written, which may be one like any other.
-    if let (true, Some(fill)) = (array.is_zarr2, array.fill) {
-        let fill = AttributeValue::Numbers {
-            kind,
-            bits: vec![fill.into()],
-        };
-        attributes.0.entry("_FillValue".to_owned()).or_insert(fill);
+    if let Some(stated) = stated_fill(kind, array.fill, array.is_zarr2) {
+        let own = attributes.0.entry("_FillValue".to_owned());
+        own.or_insert(stated);
     }
     let dimensions = array.dimensions.iter();
     let own = dimensions.filter(|(name, _)| index(indexes, array, name.as_deref()).is_none());
@@ -221,6 +218,22 @@ fn variable(array: &ForeignArray, indexes: &Indexes) -> Variable {
         kind,
         attributes,
     }
+}
+
+/// What stands for a `_FillValue` that an array has not among its attributes; none where nothing says what cells hold that nobody wrote.
+///
+/// Zarr version 2 has it where version 3 has a value for what was not written, which may be one like any other. Cells that nobody wrote hold
+/// that value and not the one that NetCDF fills variables with: where they are two, no number stands for no data.
+fn stated_fill(kind: Kind, fill: Option<f64>, is_zarr2: bool) -> Option<AttributeValue> {
+    let fill = fill?;
+    let bits = if is_zarr2 {
+        vec![fill.into()]
+    } else if kind.netcdf_fill() == Some(fill) {
+        return None;
+    } else {
+        vec![]
+    };
+    Some(AttributeValue::Numbers { kind, bits })
 }
 
 /// Attributes as a file has them. JSON does not tell types of numbers: one without a fraction is taken to be of the array's
@@ -320,10 +333,12 @@ fn cut(text: &str) -> String {
 }
 
 #[cfg(test)]
+#[expect(clippy::float_cmp, reason = "these numbers are exact")]
 mod tests {
     use serde_json::json;
 
     use super::*;
+    use crate::plan::cf::packing::Packing;
 
     #[test]
     fn several_texts_are_one_and_several_names_of_numbers_are_numbers() {
@@ -351,6 +366,30 @@ mod tests {
             let all = Map::from_iter([("_FillValue".to_owned(), value)]);
             assert!(attributes(&all, Kind::Float(4)).0.is_empty());
         }
+    }
+
+    /// Cells of an array of Zarr that nobody wrote hold its own fill value: what NetCDF fills variables with is a value there.
+    #[test]
+    fn the_fill_value_of_netcdf_is_no_data_of_arrays_that_are_filled_with_it() {
+        const SHORT: Kind = Kind::Integer(2);
+        let value = |fill: Option<f64>, is_zarr2: bool, stored: f64| {
+            let stated = stated_fill(SHORT, fill, is_zarr2);
+            let stated = stated.map(|stated| ("_FillValue".to_owned(), stated));
+            let variable = Variable {
+                name: "sst".to_owned(),
+                dimensions: vec![],
+                kind: SHORT,
+                attributes: Attributes(stated.into_iter().collect()),
+            };
+            Packing::of(&variable).value(stored)
+        };
+        let own = value(Some(0.0), false, -32_767.0);
+        assert_eq!((own, value(Some(0.0), false, 0.0)), (-32_767.0, 0.0));
+        assert!(value(Some(-32_767.0), false, -32_767.0).is_nan());
+        // Version 2 says it, or says nothing, as of files of NetCDF that are referred to.
+        assert!(value(Some(0.0), true, 0.0).is_nan());
+        assert_eq!(value(Some(0.0), true, -32_767.0), -32_767.0);
+        assert!(value(None, true, -32_767.0).is_nan());
     }
 
     #[test]

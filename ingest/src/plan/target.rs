@@ -17,8 +17,26 @@ use crate::plan::unit::Substance;
 /// Longest title and citation taken from a file, characters.
 const MAX_TITLE_CHARS: usize = 200;
 
-/// The variable to land, what it means, and what is taken for granted with that.
+/// The variable to land, what it means, and what is taken for granted with that. Where there is none, groups of the file are told:
+/// it may lie in one.
 pub(super) fn choose<'a>(
+    file: &'a Description,
+    wish: Wish<'_>,
+) -> Result<(&'a Variable, Named, Option<String>), Rejection> {
+    chosen(file, wish).map_err(|refused| match file.told_groups() {
+        Some(groups) if refused.reason == RejectReason::NoVariable => {
+            let more = format!(
+                "variables in its groups ({groups}) are not read; take them out (ncks -G : IN OUT)"
+            );
+            let more = Rejection::new(refused.reason, &refused.object, more);
+            let detail = format!("{}; {}", refused.detail, more.detail);
+            Rejection { detail, ..refused }
+        }
+        _ => refused,
+    })
+}
+
+fn chosen<'a>(
     file: &'a Description,
     wish: Wish<'_>,
 ) -> Result<(&'a Variable, Named, Option<String>), Rejection> {

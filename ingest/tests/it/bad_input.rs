@@ -311,6 +311,16 @@ async fn files_without_a_variable_to_land_say_what_they_hold() {
     drop((inner, group, grouped));
     let words = ["nothing but groups (physics)", "ncks -G"];
     assert_refused(&place, "groups.nc", RejectReason::NoVariable, &words).await;
+    // Axes alone lie outside.
+    let grouped = hdf5::File::create(place.path("axes.nc")).unwrap();
+    let group = grouped.create_group("geophysical").unwrap();
+    for (owner, name) in [(&*grouped, "lat"), (&group, "sst")] {
+        let dataset = owner.new_dataset::<f32>().shape([2_usize]);
+        drop(dataset.create(name).unwrap());
+    }
+    drop((group, grouped));
+    let words = ["in its groups (geophysical) are not read", "ncks -G"];
+    assert_refused(&place, "axes.nc", RejectReason::NoVariable, &words).await;
     let profile = Profile::find("takahashi09-flux").unwrap();
     let (reason, line) = refusal(
         &place

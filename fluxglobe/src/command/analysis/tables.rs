@@ -7,15 +7,13 @@ use contract::analysis::{
     Season, SeriesAnalysis, SeriesPlace, Trend,
 };
 
-use crate::figures::{figures, middle};
+use crate::figures::{figures, middle, million_km2};
 use crate::instants::Instants;
 
 /// Numbers of a row of bands that are shown on one line.
 const BANDS_SHOWN: usize = 12;
 /// Chances below this are told to be.
 const SMALLEST_CHANCE: f64 = 1e-300;
-/// Square metres in a million square kilometres.
-const M2_PER_MILLION_KM2: f64 = 1e12;
 
 /// Where a series is taken, for people.
 pub(super) fn place(place: &SeriesPlace) -> String {
@@ -266,7 +264,7 @@ fn of_profile(answer: &Hovmoller, row: &HovmollerRow) -> String {
             number(row.means[at]),
             number(row.stds[at]),
             format!("{:.1}", row.coverage_percent[at]),
-            format!("{:.3}", band.area_m2 / M2_PER_MILLION_KM2),
+            million_km2(band.area_m2),
         ]
     });
     let header = ["band, degrees", "mean", "std", "coverage, %", "10⁶ km²"];

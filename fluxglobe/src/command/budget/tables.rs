@@ -4,8 +4,7 @@ use comfy_table::presets::NOTHING;
 use comfy_table::{CellAlignment, Table};
 use contract::budget::{BudgetAnswer, BudgetHistory, BudgetRow, RowDraws};
 
-use super::million_km2;
-use crate::figures::figures;
+use crate::figures::{figures, million_km2};
 use crate::instants::Instants;
 
 /// Columns of days and words, which stand to the left.

@@ -19,6 +19,9 @@ pub(crate) const TEXT_BYTES: u8 = 64;
 /// Most dimensions of a variable (the limit of HDF5).
 pub(crate) const MAX_RANK: usize = 32;
 
+/// Groups that are told.
+const TOLD_GROUPS: usize = 8;
+
 /// What is in a data file.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Description {
@@ -30,6 +33,9 @@ pub(crate) struct Description {
     pub(crate) variables: Vec<Variable>,
     /// Most memory that is taken to unpack values of a variable, beside the values themselves, bytes.
     pub(crate) library_bytes: u64,
+    /// Groups beside its variables, as far as they are told: no variable of theirs is read.
+    #[serde(default)]
+    pub(crate) groups: Vec<String>,
 }
 
 /// One variable.
@@ -79,6 +85,22 @@ impl Kind {
             Self::Float(bytes) => format!("float{}", 8 * u16::from(bytes)),
             Self::Text(_) => "text".to_owned(),
             Self::Other => "of another type".to_owned(),
+        }
+    }
+
+    /// What NetCDF fills a variable with that has no fill value of its own; of bytes every value may be meant, and floating-point
+    /// numbers as large are values of nothing.
+    pub(crate) fn netcdf_fill(self) -> Option<f64> {
+        match self {
+            Self::Integer(2) => Some(-32_767.0),
+            Self::Integer(4) => Some(-2_147_483_647.0),
+            Self::Integer(8) => Some(-9_223_372_036_854_775_806.0),
+            Self::Unsigned(2) => Some(65_535.0),
+            Self::Unsigned(4) => Some(4_294_967_295.0),
+            Self::Unsigned(8) => Some(18_446_744_073_709_551_614.0),
+            Self::Integer(_) | Self::Unsigned(_) | Self::Float(_) | Self::Text(_) | Self::Other => {
+                None
+            }
         }
     }
 }
@@ -193,6 +215,19 @@ impl FromIterator<(String, AttributeValue)> for Attributes {
 }
 
 impl Description {
+    /// Some of these groups: the first few, and one more where there are more.
+    pub(crate) fn some_groups(mut groups: Vec<String>) -> Vec<String> {
+        groups.truncate(TOLD_GROUPS + 1);
+        groups
+    }
+
+    /// Its groups for people: `physics, quality`; none where there are none.
+    pub(crate) fn told_groups(&self) -> Option<String> {
+        let told = &self.groups[..self.groups.len().min(TOLD_GROUPS)];
+        let more = self.groups.get(TOLD_GROUPS).map_or("", |_| ", ...");
+        (!told.is_empty()).then(|| format!("{}{more}", told.join(", ")))
+    }
+
     /// The variable of a name.
     pub(crate) fn variable(&self, name: &str) -> Option<&Variable> {
         self.variables.iter().find(|variable| variable.name == name)

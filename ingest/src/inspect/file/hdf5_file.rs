@@ -28,8 +28,6 @@ const CHUNK_CACHE_BYTES: usize = 256 << 20;
 const CHUNK_CACHE_SLOTS: usize = 12_421;
 /// Largest single chunk, bytes: the library holds a chunk in memory whole.
 const MAX_CHUNK_BYTES: u128 = 512 << 20;
-/// Groups that are told where a file has nothing else.
-const TOLD_GROUPS: usize = 8;
 /// How a netCDF dimension without a coordinate variable is marked.
 const NO_VARIABLE: &str = "This is a netCDF dimension but not a netCDF variable";
 
@@ -190,9 +188,6 @@ fn describe(file: &File) -> Result<(Description, usize), Rejection> {
             variables.push(variable);
         }
     }
-    if variables.is_empty() && !groups.is_empty() {
-        return Err(only_groups(&groups));
-    }
     let format = if file.attr("_NCProperties").is_ok() || variables.iter().any(is_scale) {
         "NetCDF-4"
     } else {
@@ -203,16 +198,20 @@ fn describe(file: &File) -> Result<(Description, usize), Rejection> {
         attributes: attributes_of("file", file)?,
         variables,
         library_bytes: most_bytes,
+        groups: Description::some_groups(groups),
     };
+    if description.variables.is_empty()
+        && let Some(groups) = description.told_groups()
+    {
+        return Err(only_groups(&groups));
+    }
     Ok((description, most_chunk_bytes as usize))
 }
 
 /// A refusal of a file whose variables, if it has any, lie in groups.
-fn only_groups(groups: &[String]) -> Rejection {
-    let told = groups[..groups.len().min(TOLD_GROUPS)].join(", ");
-    let more = groups.get(TOLD_GROUPS).map_or("", |_| ", ...");
+fn only_groups(told: &str) -> Rejection {
     let detail = format!(
-        "holds nothing but groups ({told}{more}), and variables outside of groups are read; take them out (ncks -G : IN OUT)"
+        "holds nothing but groups ({told}), and variables outside of groups are read; take them out (ncks -G : IN OUT)"
     );
     Rejection::new(RejectReason::NoVariable, "file", detail)
 }

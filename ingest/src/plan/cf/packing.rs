@@ -122,7 +122,7 @@ impl Packing {
             .collect();
         // Whatever else means no data: cells that nobody wrote hold it.
         if attributes.numbers("_FillValue").is_none() {
-            fills.extend(default_fill(variable.kind));
+            fills.extend(variable.kind.netcdf_fill());
         }
         let is_unsigned = attributes
             .text("_Unsigned")
@@ -407,19 +407,6 @@ fn width(kind: Kind) -> (bool, u8) {
         Kind::Float(bytes) => (true, bytes),
         Kind::Integer(bytes) | Kind::Unsigned(bytes) => (false, bytes),
         Kind::Text(_) | Kind::Other => (false, 0),
-    }
-}
-
-/// What NetCDF fills a variable with that has no fill value of its own; of bytes every value may be meant.
-fn default_fill(kind: Kind) -> Option<f64> {
-    match kind {
-        Kind::Integer(2) => Some(-32_767.0),
-        Kind::Integer(4) => Some(-2_147_483_647.0),
-        Kind::Integer(8) => Some(-9_223_372_036_854_775_806.0),
-        Kind::Unsigned(2) => Some(65_535.0),
-        Kind::Unsigned(4) => Some(4_294_967_295.0),
-        Kind::Unsigned(8) => Some(18_446_744_073_709_551_614.0),
-        Kind::Integer(_) | Kind::Unsigned(_) | Kind::Float(_) | Kind::Text(_) | Kind::Other => None,
     }
 }
 

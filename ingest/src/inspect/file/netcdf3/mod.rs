@@ -226,6 +226,7 @@ fn lay_out(header: &Header, file_bytes: u64) -> Result<(Description, Vec<Layout>
         attributes: header.attributes.clone(),
         variables,
         library_bytes: 0,
+        groups: vec![],
     };
     Ok((description, layouts))
 }
