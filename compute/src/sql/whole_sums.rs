@@ -120,11 +120,9 @@ fn widened(field: &Field) -> FieldRef {
     Arc::new(Field::new(field.name(), WIDE, true))
 }
 
-fn widely(args: AccumulatorArgs<'_>) -> AccumulatorArgs<'_> {
-    AccumulatorArgs {
-        return_field: widened(&args.return_field),
-        ..args
-    }
+fn widely(mut args: AccumulatorArgs<'_>) -> AccumulatorArgs<'_> {
+    args.return_field = widened(&args.return_field);
+    args
 }
 
 fn wide(values: &[ArrayRef]) -> Result<Vec<ArrayRef>> {

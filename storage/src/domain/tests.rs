@@ -101,8 +101,9 @@ async fn the_same_cells_are_the_same_object_however_they_were_found() {
     joined.add(&second);
     joined.add(&first);
     let mut read_and_changed = read.clone();
-    read_and_changed.add_valued(60_000, &[1.0; 5_000]);
-    read_and_changed.remove_valued(60_000, &[1.0; 5_000]);
+    let some = vec![1.0; 5_000];
+    read_and_changed.add_valued(60_000, &some);
+    read_and_changed.remove_valued(60_000, &some);
     // Runs that are larger than what else they could be.
     let mut all_runs = of_ranges.clone();
     all_runs.set |= &read.set;
