@@ -3,6 +3,7 @@
 mod asked;
 mod id;
 mod inside;
+mod page_ends;
 mod paged;
 
 use serde::{Deserialize, Serialize};
@@ -20,7 +21,7 @@ use crate::time::{Period, TimeMs};
 
 pub use asked::AskedVersion;
 pub use id::ManifestId;
-pub use paged::{PAGE_STEPS, PAGED_SCHEMA, Page, PagedManifest};
+pub use paged::{LEAST_PAGED_STEPS, OLDEST_PAGED_SCHEMA, PAGED_SCHEMA, Page, PagedManifest};
 
 /// Version of the manifest's JSON as it is written. Those since [`OLDEST_MANIFEST_SCHEMA`] are read too.
 ///

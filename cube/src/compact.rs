@@ -1,15 +1,16 @@
-//! The cube of a product in, its runs of steps time-major out, and sums of them: what is there map-major is cut otherwise, run by run.
+//! The cube of a product in, its runs of steps time-major out, and sums of them: what is there map-major is cut otherwise, run by run, and
+//! some runs are committed together.
 //!
 //! Nothing waits for it, and it may be killed at any point: what was sent and not committed is removed by clean-up, and
 //! whoever publishes next goes on. Two that do the same at once send the same values, and the second finds them there.
-//! Values of one shard are held at a time: 128 MiB at most, sums of it, a fifth of that, and what is read and written of it.
+//! Values of one shard are held at a time: 128 MiB at most, sums of it, a fifth of that, and what is read and written of it; of runs that wait
+//! for their commit where their shards are, some 200 bytes each.
 
 use std::sync::Arc;
 
 use bytes::Bytes;
 use contract::digest::Digest;
 use futures::future::BoxFuture;
-use futures::stream::{self, StreamExt as _, TryStreamExt as _};
 use icechunk::format::manifest::ChunkPayload;
 use icechunk::format::{ChunkIndices, Path};
 use icechunk::session::SessionErrorKind;
@@ -21,22 +22,26 @@ use crate::arrays::{self, Definition, SERIES};
 use crate::blocks::RunAxis;
 use crate::edit::ATTEMPTS;
 use crate::field::SeriesEncoder;
-use crate::layout::RUN_STEPS;
 use crate::series;
+use crate::stacked::stacked;
 use crate::state::State;
 use crate::sums::Basis;
-use crate::{Cube, CubeError, Repository, complete, placing};
-
-/// Steps whose windows are read at a time.
-const STEPS_AT_ONCE: usize = 16;
+use crate::{Cube, CubeError, Repository, complete, held_steps, placing};
 
 /// A shard that is in the store, by its row and column; none where no cell has data.
 type Shard = ([u32; 2], Option<ChunkPayload>);
 
-/// Shards of a run.
-#[derive(Default)]
+/// Most runs that are committed together: a commit writes manifests, names of runs and the list of all states again, whatever it is of.
+const RUNS_AT_ONCE: usize = 16;
+/// Shards of all of them, up to 128 MiB of values each: who is killed has as much to make again, and what one run has where it has more.
+const SHARDS_AT_ONCE: usize = 64;
+
+/// A run whose shards are in the store.
 struct Made {
-    /// Of the time-major copy; none where it is there already.
+    run: usize,
+    /// Was the time-major copy there, and are these sums of it alone?
+    had_series: bool,
+    /// Of the time-major copy; none where it was there.
     series: Vec<Shard>,
     /// Of sums; none of a quantity that is not summed.
     sums: Vec<Shard>,
@@ -50,46 +55,75 @@ struct Made {
 pub fn compact<'a>(store: &'a Store, folder: &'a str) -> BoxFuture<'a, Result<usize, CubeError>> {
     Box::pin(async move {
         let repository = Repository::open(store, folder).await?;
-        let mut made = 0;
+        let mut count = 0;
         let cube = loop {
             let cube = repository.newest().await?;
-            let Some(run) = cube.first_missing() else {
+            let missing = cube.missing();
+            if missing.is_empty() {
                 break cube;
-            };
+            }
             let compaction = Compaction {
                 repository: &repository,
                 cube: &cube,
                 encoder: Arc::new(SeriesEncoder::new(cube.description())?),
                 basis: cube.sums().next_basis(cube.description()),
-                run,
-                has_series: cube.runs().is_of(run, cube.steps()),
             };
-            let shards = compaction.shards().await?;
-            made += usize::from(compaction.place(&shards).await?);
+            let at_once = runs_at_once(compaction.encoder.shards().len());
+            let (mut made, mut failed) = (vec![], None);
+            for run in missing.into_iter().take(at_once) {
+                match compaction.run(run).made().await {
+                    Ok(own) => made.push(own),
+                    Err(error) => {
+                        failed = Some(error);
+                        break;
+                    }
+                }
+            }
+            // Those before one that cannot be made are whole.
+            count += compaction.place(&made).await?;
+            if let Some(error) = failed {
+                return Err(error);
+            }
         };
         complete::complete(&repository, cube).await?;
-        Ok(made)
+        Ok(count)
     })
 }
 
+/// How many runs of so many shards are committed together.
+fn runs_at_once(shards: usize) -> usize {
+    (SHARDS_AT_ONCE / shards.max(1)).clamp(1, RUNS_AT_ONCE)
+}
+
+/// Makes runs of a state.
 struct Compaction<'a> {
     repository: &'a Repository,
     cube: &'a Cube,
     encoder: Arc<SeriesEncoder>,
     /// How values count in sums; none of a quantity that is not summed.
     basis: Option<Arc<Basis>>,
+}
+
+/// Makes one of them.
+struct Run<'a> {
+    of: &'a Compaction<'a>,
     run: usize,
     /// Is the time-major copy there, and sums alone are made?
     has_series: bool,
 }
 
-impl Compaction<'_> {
+impl Run<'_> {
     /// Sends all shards of the run: values of the next one are read while one is encoded.
-    async fn shards(&self) -> Result<Made, CubeError> {
-        let session = self.repository.session().await?;
-        let (series, sums) = (self.series_path()?, self.sums_path()?);
-        let mut made = Made::default();
-        let mut left = self.encoder.shards().into_iter();
+    async fn made(&self) -> Result<Made, CubeError> {
+        let session = self.of.repository.session().await?;
+        let (series, sums) = (self.of.series_path()?, self.of.sums_path()?);
+        let mut made = Made {
+            run: self.run,
+            had_series: self.has_series,
+            series: vec![],
+            sums: vec![],
+        };
+        let mut left = self.of.encoder.shards().into_iter();
         let mut coming = left.next();
         let mut values = self.values(coming).await?;
         while let Some(shard) = coming {
@@ -112,7 +146,7 @@ impl Compaction<'_> {
             if !self.has_series {
                 made.series.push(sent.0);
             }
-            if self.basis.is_some() {
+            if self.of.basis.is_some() {
                 made.sums.push(sent.1);
             }
             values = next;
@@ -122,13 +156,13 @@ impl Compaction<'_> {
 
     /// Values of a shard, `[step, row, col]`; none where no cell has data.
     async fn values(&self, shard: Option<[u32; 2]>) -> Result<Option<Vec<f32>>, CubeError> {
-        let (cube, run) = (self.cube, self.run);
+        let (cube, run) = (self.of.cube, self.run);
         let Some(shard) = shard else { return Ok(None) };
         if self.has_series {
             return cube.shard(run, shard).await;
         }
         let held = series::steps_of(run, cube.steps()).len();
-        stacked(cube, &self.encoder, (run, held), shard)
+        stacked(cube, &self.of.encoder, (run, held), shard)
             .await
             .map(Some)
     }
@@ -142,7 +176,7 @@ impl Compaction<'_> {
         let Some(values) = values.map(Arc::new) else {
             return Ok([None, None]);
         };
-        let (encoder, own) = (Arc::clone(&self.encoder), Arc::clone(&values));
+        let (encoder, own) = (Arc::clone(&self.of.encoder), Arc::clone(&values));
         let has_series = self.has_series;
         let series = tokio::task::spawn_blocking(move || {
             if has_series {
@@ -150,7 +184,7 @@ impl Compaction<'_> {
             }
             encoder.encode(&own)
         });
-        let (encoder, basis) = (Arc::clone(&self.encoder), self.basis.clone());
+        let (encoder, basis) = (Arc::clone(&self.of.encoder), self.of.basis.clone());
         let sums = tokio::task::spawn_blocking(move || {
             let records = basis.map(|basis| encoder.records(&values, shard, &basis));
             drop(values);
@@ -159,6 +193,17 @@ impl Compaction<'_> {
         });
         let (series, sums) = tokio::try_join!(series, sums).map_err(|e| thread(&e))?;
         Ok([series?, sums?])
+    }
+}
+
+impl Compaction<'_> {
+    /// What makes a run.
+    fn run(&self, run: usize) -> Run<'_> {
+        Run {
+            of: self,
+            run,
+            has_series: self.cube.runs().is_of(run, self.cube.steps()),
+        }
     }
 
     fn series_path(&self) -> Result<Path, CubeError> {
@@ -174,35 +219,35 @@ impl Compaction<'_> {
         path.map_err(|e| self.repository.failed("naming the series", &e))
     }
 
-    /// Gives shards their places, unless somebody else has placed the same, or the steps are others by now; were they placed?
-    async fn place(&self, made: &Made) -> Result<bool, CubeError> {
-        let (repository, run) = (self.repository, self.run);
-        let failed = |e: &dyn std::fmt::Display| repository.failed("placing a series", e);
-        let description = self.cube.description();
-        let held = series::steps_of(run, self.cube.steps()).len();
-        let Some(name) = series::name_of(run, self.cube.steps()) else {
-            return Ok(false);
-        };
+    /// Gives runs their places, but those that somebody else has placed, or whose steps are others by now; how many were placed.
+    async fn place(&self, made: &[Made]) -> Result<usize, CubeError> {
+        let repository = self.repository;
+        // Reading a state takes as long as its cube has steps.
+        if made.is_empty() {
+            return Ok(0);
+        }
         for _attempt in 0..ATTEMPTS {
             let state = State::newest(repository).await?;
-            let is_same = state.describes_same_cells(description)
-                && series::name_of_first(held, run, &state.steps) == Some(name);
-            let is_placed = if self.has_series {
-                // Sums of a run that is there no more are of no use.
-                state.runs.name(run) != Some(name) || state.sums.runs.name(run) == Some(name)
-            } else {
-                state.runs.held_count(run, &state.steps) >= held
-            };
-            if !is_same || is_placed {
-                return Ok(false);
+            let wanted = made.iter().filter_map(|own| {
+                let name = self.name_over(&state, own)?;
+                Some((own, name))
+            });
+            let wanted: Vec<(&Made, Digest)> = wanted.collect();
+            if wanted.is_empty() {
+                return Ok(0);
             }
-            self.write(&state, made, name).await?;
-            let mut session = state.session.write().await;
-            let message = format!("run {run} of the series");
-            match session.commit(message).execute().await {
-                Ok(_snapshot) => return Ok(true),
+            self.write(&state, &wanted).await?;
+            let runs: Vec<String> = wanted.iter().map(|(own, _)| own.run.to_string()).collect();
+            let message = format!("runs of the series: {}", runs.join(", "));
+            let committed = state.session.write().await.commit(message).execute().await;
+            match committed {
+                Ok(snapshot) => {
+                    let snapshots = (state.snapshot.as_str(), &*snapshot.to_string());
+                    held_steps::committed(&repository.place, snapshots, &state.steps);
+                    return Ok(wanted.len());
+                }
                 Err(e) if matches!(e.kind, SessionErrorKind::Conflict { .. }) => {}
-                Err(e) => return Err(failed(&e)),
+                Err(e) => return Err(repository.failed("placing a series", &e)),
             }
         }
         Err(CubeError::Contended {
@@ -211,106 +256,69 @@ impl Compaction<'_> {
         })
     }
 
+    /// The name of a run that was made, by its steps; none if a state has another one in its place, or this one already.
+    fn name_over(&self, state: &State, made: &Made) -> Option<Digest> {
+        let (run, steps) = (made.run, self.cube.steps());
+        let held = series::steps_of(run, steps).len();
+        let name = series::name_of(run, steps)?;
+        let is_same = state.describes_same_cells(self.cube.description())
+            && series::name_of_first(held, run, &state.steps) == Some(name);
+        let is_placed = if made.had_series {
+            // Sums of a run that is there no more are of no use, nor are those that cannot be put beside what is there.
+            state.runs.name(run) != Some(name)
+                || state.sums.runs.name(run) == Some(name)
+                || self.basis_over(state).is_none()
+        } else {
+            state.runs.held_count(run, &state.steps) >= held
+        };
+        (is_same && !is_placed).then_some(name)
+    }
+
+    /// How values count in the sums that were made; none where somebody else has made some meanwhile in which they count otherwise: others
+    /// cannot be put beside those.
+    fn basis_over(&self, state: &State) -> Option<&Arc<Basis>> {
+        let basis = self.basis.as_ref();
+        basis.filter(|own| state.sums.basis.as_ref().is_none_or(|there| there == *own))
+    }
+
     /// Writes what was made over a state.
-    async fn write(&self, state: &State, made: &Made, name: Digest) -> Result<(), CubeError> {
+    async fn write(&self, state: &State, made: &[(&Made, Digest)]) -> Result<(), CubeError> {
         let failed = |e: &dyn std::fmt::Display| self.repository.failed("placing a series", e);
-        let (description, run) = (self.cube.description(), self.run);
+        let description = self.cube.description();
         let arrays = Arc::new(AsyncIcechunkStore::from(Arc::clone(&state.session)));
-        if !self.has_series {
-            let runs = state.runs.clone().with(run, name);
+        if made.iter().any(|(own, _)| !own.had_series) {
+            let own = made.iter().filter(|(own, _)| !own.had_series);
+            let runs = own.fold(state.runs.clone(), |runs, (own, name)| {
+                runs.with(own.run, *name)
+            });
             let array = arrays::series(description, runs.len())?;
             runs.write(&arrays, (SERIES, Map::new()), array).await?;
             placing::drop_copy_of_before(self.repository, &state.session).await?;
         }
-        // Those that somebody else has made meanwhile count as they say, and others cannot be put beside them.
-        let basis = self.basis.as_ref();
-        let basis = basis.filter(|own| state.sums.basis.as_ref().is_none_or(|there| there == *own));
+        let basis = self.basis_over(state);
         if let Some(basis) = basis {
-            let runs = state.sums.runs.clone().with(run, name);
+            let before = state.sums.runs.clone();
+            let named = made.iter();
+            let runs = named.fold(before, |runs, (own, name)| runs.with(own.run, *name));
             let (sums, session) = (&state.sums, &state.session);
             let own = (&**basis, &runs);
             sums.write(session, &arrays, description, own).await?;
         }
-        let series = (self.series_path()?, RunAxis::First, &made.series);
-        let of_sums =
-            basis.map(|_| Ok::<_, CubeError>((self.sums_path()?, RunAxis::Last, &made.sums)));
+        let (series_path, sums_path) = (self.series_path()?, self.sums_path()?);
         let mut session = state.session.write().await;
-        for (path, axis, shards) in std::iter::once(series).chain(of_sums.transpose()?) {
-            for (shard, payload) in shards {
-                let here = ChunkIndices(axis.index(*shard, run).to_vec());
-                let set = session.set_chunk_ref(path.clone(), here, payload.clone());
-                set.await.map_err(|e| failed(&e))?;
+        for (own, _) in made {
+            let series = (&series_path, RunAxis::First, &own.series);
+            let sums = basis.map(|_| (&sums_path, RunAxis::Last, &own.sums));
+            for (path, axis, shards) in std::iter::once(series).chain(sums) {
+                for (shard, payload) in shards {
+                    let here = ChunkIndices(axis.index(*shard, own.run).to_vec());
+                    let set = session.set_chunk_ref(path.clone(), here, payload.clone());
+                    set.await.map_err(|e| failed(&e))?;
+                }
             }
         }
         Ok(())
     }
-}
-
-/// Does the time-major copy of a run hold the values of its steps, and are the sums of it those of these values?
-///
-/// # Errors
-/// `Chunk` with the first shard that does not.
-pub(crate) async fn compare(cube: &Cube, run: usize) -> Result<(), CubeError> {
-    let encoder = SeriesEncoder::new(cube.description())?;
-    let held = cube.runs().held_count(run, cube.steps());
-    let basis = cube.sums().basis.clone();
-    let basis = basis.filter(|_| cube.is_summed(run));
-    for shard in encoder.shards() {
-        let told = cube.shard(run, shard).await?;
-        let own = stacked(cube, &encoder, (run, held), shard).await?;
-        let is_same = match &told {
-            Some(told) => {
-                let bits = |value: &f32| value.to_bits();
-                told.iter().map(bits).eq(own.iter().map(bits))
-            }
-            None => own.iter().all(|value| value.is_nan()),
-        };
-        let differs = |array: Option<String>, what: &str| CubeError::Chunk {
-            array: array.unwrap_or_default(),
-            chunk: vec![shard[0].into(), shard[1].into(), run as u64],
-            reason: what.to_owned(),
-        };
-        if !is_same {
-            let what = "its values are not those of its steps";
-            return Err(differs(cube.series_name(), what));
-        }
-        let Some(basis) = &basis else { continue };
-        let told = cube.records_of_shard(run, shard).await?;
-        let own = encoder.records(&own, shard, basis);
-        let is_same = match told {
-            Some(told) => told == own,
-            None => own.iter().all(|byte| *byte == 0),
-        };
-        if !is_same {
-            let what = "its sums are not those of its steps";
-            return Err(differs(cube.sums_name(), what));
-        }
-    }
-    Ok(())
-}
-
-/// Values of a shard of the first `held` steps of a run, `[step, row, col]`, read map-major.
-async fn stacked(
-    cube: &Cube,
-    encoder: &SeriesEncoder,
-    (run, held): (usize, usize),
-    shard: [u32; 2],
-) -> Result<Vec<f32>, CubeError> {
-    let (window, cols) = (encoder.window(shard), encoder.shard_cols());
-    let mut stacked = vec![f32::NAN; encoder.shard_values()];
-    let all: Vec<usize> = series::steps_of(run, cube.steps()).take(held).collect();
-    let maps = stream::iter(all).map(|step| cube.window(step, window));
-    let mut maps = maps.buffered(STEPS_AT_ONCE);
-    for map in stacked.chunks_exact_mut(encoder.shard_values() / RUN_STEPS) {
-        let Some(found) = maps.try_next().await? else {
-            break;
-        };
-        let rows = found.chunks_exact(window.cols as usize);
-        for (row, found) in map.chunks_exact_mut(cols).zip(rows) {
-            row[..found.len()].copy_from_slice(found);
-        }
-    }
-    Ok(stacked)
 }
 
 fn thread(error: &tokio::task::JoinError) -> CubeError {
@@ -319,11 +327,15 @@ fn thread(error: &tokio::task::JoinError) -> CubeError {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeSet;
+
     use contract::grid::Grid;
     use contract::quantity::Quantity;
     use contract::time::{Period, TimeMs};
 
     use super::*;
+    use crate::layout::RUN_STEPS;
+    use crate::stacked::compare;
     use crate::{At, Description, Edit};
 
     const GRID: Grid = Grid {
@@ -334,6 +346,12 @@ mod tests {
         dlat_deg: 1.0,
         dlon_deg: 1.0,
     };
+
+    #[test]
+    fn large_runs_are_committed_one_by_one_and_small_ones_together() {
+        let counts = [1, 2, 6, 33, 64, 2556].map(runs_at_once);
+        assert_eq!(counts, [16, 16, 10, 1, 1, 1]);
+    }
 
     #[tokio::test]
     async fn runs_of_before_get_their_sums_and_keep_their_values() {
@@ -372,7 +390,7 @@ mod tests {
         drop(session);
         let without = repository.at(&At::Newest).await.unwrap();
         assert!(!without.is_summed(0) && without.sums_name().is_none());
-        assert_eq!(without.first_missing(), Some(0));
+        assert_eq!(without.missing(), BTreeSet::from([0]));
         assert_eq!(compact(&store, "p").await.unwrap(), 1);
         let after = repository.at(&At::Newest).await.unwrap();
         assert!(after.is_summed(0));

@@ -52,6 +52,7 @@ mod run_shards;
 pub mod scale;
 mod series;
 mod shards;
+mod stacked;
 mod staged;
 mod state;
 mod step_bands;

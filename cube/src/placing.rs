@@ -14,7 +14,7 @@ use crate::arrays::{self, SERIES, SERIES_OF_BEFORE};
 use crate::blocks::RunAxis;
 use crate::edit::ATTEMPTS;
 use crate::state::State;
-use crate::{CubeError, Description, Repository, Step, series};
+use crate::{CubeError, Description, Repository, Step, held_steps, series};
 
 /// A run whose shards are in the store.
 pub(crate) struct SentRun {
@@ -107,7 +107,11 @@ pub(crate) async fn place(
             }
         }
         match session.commit("runs of the series").execute().await {
-            Ok(_snapshot) => return Ok(()),
+            Ok(snapshot) => {
+                let snapshots = (state.snapshot.as_str(), &*snapshot.to_string());
+                held_steps::committed(&repository.place, snapshots, &state.steps);
+                return Ok(());
+            }
             Err(e) if matches!(e.kind, SessionErrorKind::Conflict { .. }) => {}
             Err(e) => return Err(failed(&e)),
         }

@@ -1,5 +1,6 @@
 //! One state of a cube, to read: windows of cells of a step, whole fields, blocks of its time-major copy.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use contract::chunk::Window;
@@ -344,15 +345,15 @@ impl Cube {
         own.is_some() && own == self.0.runs.name(run)
     }
 
-    /// What compaction is to make next: a run of the time-major copy, and sums of it.
-    pub(crate) fn first_missing(&self) -> Option<usize> {
+    /// What compaction is to make, ascending: runs of the time-major copy, and of those that are there sums.
+    pub(crate) fn missing(&self) -> BTreeSet<usize> {
         let Inner { runs, steps, .. } = &*self.0;
-        let missing = runs.first_missing(steps);
-        if self.0.sums.next_basis(&self.0.description).is_none() {
-            return missing;
+        let mut missing: BTreeSet<usize> = runs.missing(steps).collect();
+        if self.0.sums.next_basis(&self.0.description).is_some() {
+            let complete = 0..steps.len() / RUN_STEPS;
+            missing.extend(complete.filter(|run| !self.is_summed(*run)));
         }
-        let complete = missing.unwrap_or(usize::MAX).min(steps.len() / RUN_STEPS);
-        (0..complete).find(|run| !self.is_summed(*run)).or(missing)
+        missing
     }
 
     /// Records of sums of a run, as they are stored.

@@ -81,16 +81,19 @@ impl Runs {
         own.is_some() && own == name_of(run, steps)
     }
 
-    /// The first run of these steps that is to be made: a complete one that is not there, or the last one where it lacks many.
+    /// Runs of these steps that are to be made, ascending: complete ones that are not there, and the last one where it lacks many.
     /// What is made anew with every [`LEAST_NEW`] steps at first, and later with half as many again, is written less than four times in all.
-    pub(crate) fn first_missing(&self, steps: &[Step]) -> Option<usize> {
+    pub(crate) fn missing(&self, steps: &[Step]) -> impl Iterator<Item = usize> {
         let complete = steps.len() / RUN_STEPS;
-        let missing = (0..complete).find(|run| !self.is_of(*run, steps));
-        missing.or_else(|| {
-            let held = self.held_count(complete, steps);
-            let new = steps.len() % RUN_STEPS - held;
-            (new >= LEAST_NEW.max(held / 2)).then_some(complete)
-        })
+        let missing = (0..complete).filter(move |run| !self.is_of(*run, steps));
+        let held = self.held_count(complete, steps);
+        let new = steps.len() % RUN_STEPS - held;
+        missing.chain((new >= LEAST_NEW.max(held / 2)).then_some(complete))
+    }
+
+    /// The first of them.
+    pub(crate) fn first_missing(&self, steps: &[Step]) -> Option<usize> {
+        self.missing(steps).next()
     }
 
     /// Those that are still there when the steps are these, and the ones that are not any more.

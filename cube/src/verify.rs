@@ -20,7 +20,7 @@ use storage::{StorageError, Store, manifests};
 
 use crate::follow::folder;
 use crate::object_storage::is_initial;
-use crate::{At, Cube, CubeError, Repository, Step, compact, complete, series};
+use crate::{At, Cube, CubeError, Repository, Step, complete, series, stacked};
 pub use mend::{Mending, mend, mending};
 
 /// What a cube was found to be.
@@ -285,7 +285,7 @@ impl Check<'_> {
             {
                 continue;
             }
-            match compact::compare(cube, run).await {
+            match stacked::compare(cube, run).await {
                 Ok(()) => {}
                 Err(error @ CubeError::Chunk { .. }) => {
                     let mut finding = self.finding(&error);

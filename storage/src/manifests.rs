@@ -11,8 +11,8 @@ use contract::digest::Digest;
 use contract::key::ObjectKey;
 use contract::kind::Kind;
 use contract::manifest::{
-    MANIFEST_SCHEMA, Manifest, ManifestId, OLDEST_MANIFEST_SCHEMA, PAGE_STEPS, PAGED_SCHEMA,
-    PagedManifest, Step,
+    LEAST_PAGED_STEPS, MANIFEST_SCHEMA, Manifest, ManifestId, OLDEST_MANIFEST_SCHEMA,
+    OLDEST_PAGED_SCHEMA, PAGED_SCHEMA, PagedManifest, Step,
 };
 use contract::product::ProductId;
 
@@ -211,21 +211,16 @@ async fn put(store: &Store, manifest: &Manifest) -> Result<ManifestId, StorageEr
     }
     // What the version before names is durable; all else is made so now, whoever may have had it once.
     let before = ObjectKey::manifest(&manifest.product, manifest.number.saturating_sub(1));
-    let names = if manifest.steps.len() < PAGE_STEPS {
+    let named_before = if manifest.steps.len() < LEAST_PAGED_STEPS {
         vec![]
     } else {
         page_names(store, &before).await?
     };
-    let key_of = |name: &Digest| ObjectKey::manifest_page(&manifest.product, name);
-    let known = |at: usize| {
-        let name = *names.get(at)?;
-        Some((name, store.pages.get(&key_of(&name))?))
-    };
-    let Some((paged, pages)) = manifest.paged_after(known) else {
+    let held = pages::held(store, &manifest.product, &named_before);
+    let Some((paged, pages)) = manifest.paged_after(|start| held.get(&start).cloned()) else {
         document::put_new(store, &key, manifest).await?;
         return Ok(manifest.id());
     };
-    let named_before = names.iter().map(key_of).collect();
     pages::write(store, &manifest.product, pages, &named_before).await?;
     document::put_new(store, &key, &paged).await?;
     Ok(paged.id)
@@ -305,7 +300,7 @@ async fn stored(store: &Store, key: &ObjectKey) -> Result<Option<Stored>, Storag
         OLDEST_MANIFEST_SCHEMA..=MANIFEST_SCHEMA => serde_json::from_slice(&text)
             .map(|manifest| Some(Stored::Whole(manifest)))
             .map_err(damaged),
-        PAGED_SCHEMA => serde_json::from_slice(&text)
+        OLDEST_PAGED_SCHEMA..=PAGED_SCHEMA => serde_json::from_slice(&text)
             .map(|paged| Some(Stored::Paged(paged)))
             .map_err(damaged),
         schema => {
@@ -421,7 +416,7 @@ mod tests {
     async fn one_more_step_writes_no_page_again_and_all_versions_stay_readable() {
         let store = Store::memory();
         let product = "p".parse().unwrap();
-        let days = 5 * PAGE_STEPS + 3;
+        let days = 643;
         commit(&store, &of_days(1, days)).await.unwrap();
         let before = bytes(&store).await;
         commit(&store, &of_days(2, days + 1)).await.unwrap();

@@ -1,10 +1,11 @@
 //! A manifest as it is stored where it has many steps: all but the last ones in pages that never change, so that one more step
-//! costs the same however many there are. Pure.
+//! costs the same however many there are, and wherever it lies. Pure.
 
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
+use super::page_ends::page_ends;
 use super::{Manifest, ManifestId, Step};
 use crate::ContractError;
 use crate::computed::Computed;
@@ -14,17 +15,25 @@ use crate::index::DimensionIndex;
 use crate::key::ObjectKey;
 use crate::notice::NoticeRun;
 use crate::quantity::Quantity;
+use crate::time::TimeMs;
 
-/// Steps of a page: what a landing writes again is half of them on average, 20 kB, and 10,000 steps are 78 pages.
-pub const PAGE_STEPS: usize = 128;
-/// Version of the JSON of a manifest whose steps are in pages.
-pub const PAGED_SCHEMA: u32 = 3;
+/// Manifests of fewer steps are stored whole.
+pub const LEAST_PAGED_STEPS: usize = 128;
+/// Version of the JSON of a manifest whose steps are in pages, as it is written. Those since [`OLDEST_PAGED_SCHEMA`] are read too.
+///
+/// 4: steps say by their starts where a page ends (`page_ends.rs`); pages of before had [`EVEN_PAGE_STEPS`] each, and a step before all
+/// others changed every one.
+pub const PAGED_SCHEMA: u32 = 4;
+/// Oldest version that is read.
+pub const OLDEST_PAGED_SCHEMA: u32 = 3;
+/// Steps of each page of schema 3.
+const EVEN_PAGE_STEPS: usize = 128;
 
 /// Some consecutive steps, named by the digest of their JSON.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Page {
-    /// [`PAGED_SCHEMA`].
+    /// That of the manifest it was written for: [`OLDEST_PAGED_SCHEMA`] to [`PAGED_SCHEMA`].
     pub schema: u32,
     /// Steps in the order of time.
     pub steps: Vec<Step>,
@@ -44,7 +53,7 @@ impl Page {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PagedManifest {
-    /// [`PAGED_SCHEMA`].
+    /// [`OLDEST_PAGED_SCHEMA`] to [`PAGED_SCHEMA`].
     pub schema: u32,
     /// The schema of the manifest itself, which its name depends on.
     pub of_schema: u32,
@@ -60,9 +69,9 @@ pub struct PagedManifest {
     pub source: String,
     /// The one grid of all steps.
     pub grid: Grid,
-    /// Names of pages of [`PAGE_STEPS`] steps each, in the order of time.
+    /// Names of pages, in the order of time.
     pub pages: Vec<Digest>,
-    /// Steps after those, too few for a page.
+    /// Steps after those, behind the last end of a page.
     pub rest: Page,
     /// Cells that hold data in some step.
     pub domain: ObjectKey,
@@ -88,41 +97,37 @@ impl PagedManifest {
     /// The manifest, of its pages in their order.
     ///
     /// # Errors
-    /// A page has not as many steps as it must: some other page was given.
+    /// Pages that end elsewhere than they must, or are more or fewer than it names: some other page was given.
     pub fn with_pages<'a>(
         self,
         pages: impl IntoIterator<Item = &'a Page>,
     ) -> Result<Manifest, ContractError> {
-        let ManifestId {
-            product, number, ..
-        } = self.id;
-        let (mut steps, mut orders): (Vec<Step>, Vec<_>) = (vec![], vec![]);
+        let (mut steps, mut orders, mut ends) = (vec![], vec![], vec![]);
         let mut take = |page: &Page| {
             steps.extend_from_slice(&page.steps);
             orders.extend(NoticeRun::orders(&page.notices, page.steps.len()));
+            steps.len()
         };
-        let mut count = 0;
-        for page in pages {
-            if page.steps.len() != PAGE_STEPS {
-                let (found, expected) = (page.steps.len().to_string(), "a whole page of steps");
-                return Err(ContractError::invalid(
-                    "page of a manifest",
-                    &found,
-                    expected,
-                ));
-            }
-            take(page);
-            count += 1;
-        }
-        if count != self.pages.len() {
-            let expected = "as many pages as it names";
+        ends.extend(pages.into_iter().map(&mut take));
+        take(&self.rest);
+        let expected = if self.schema == OLDEST_PAGED_SCHEMA {
+            let even = (1..=self.pages.len()).map(|page| page * EVEN_PAGE_STEPS);
+            even.collect()
+        } else {
+            page_ends(&steps)
+        };
+        if ends != expected || ends.len() != self.pages.len() {
+            let other = ends.iter().zip(&expected).position(|(own, it)| own != it);
+            let page = other.unwrap_or(ends.len().min(expected.len()));
             return Err(ContractError::invalid(
                 "pages of a manifest",
-                &count.to_string(),
-                expected,
+                &format!("page {page} of {}", ends.len()),
+                "those that it names, each ending where its steps say",
             ));
         }
-        take(&self.rest);
+        let ManifestId {
+            product, number, ..
+        } = self.id;
         Ok(Manifest {
             schema: self.of_schema,
             product,
@@ -150,15 +155,15 @@ impl Manifest {
         Some((paged, pages.into_iter().map(|(_name, page)| page).collect()))
     }
 
-    /// The same, and of the pages, with their names, those that are not `before` in the same place, where that knows a page and its name: to name one takes
-    /// its whole JSON, to compare it takes little.
+    /// The same, and of the pages, with their names, those alone that are not there `before`: that knows some by the start of their first step, with
+    /// their names. To name one takes its whole JSON, to compare it takes little.
     pub fn paged_after(
         &self,
-        before: impl Fn(usize) -> Option<(Digest, Arc<Page>)>,
+        before: impl Fn(TimeMs) -> Option<(Digest, Arc<Page>)>,
     ) -> Option<(PagedManifest, Vec<(Digest, Page)>)> {
         let orders = self.notice_orders();
         let is_plain = self.series.is_empty() && NoticeRun::of(&orders) == self.notices;
-        if self.steps.len() < PAGE_STEPS || !is_plain {
+        if self.steps.len() < LEAST_PAGED_STEPS || !is_plain {
             return None;
         }
         let page = |steps: &[Step], notices| Page {
@@ -166,18 +171,14 @@ impl Manifest {
             steps: steps.to_vec(),
             notices,
         };
-        let (steps, orders) = (
-            self.steps.chunks_exact(PAGE_STEPS),
-            orders.chunks_exact(PAGE_STEPS),
-        );
-        let rest = page(steps.remainder(), NoticeRun::of(orders.remainder()));
         let (mut names, mut new) = (vec![], vec![]);
-        for (at, (steps, orders)) in steps.zip(orders).enumerate() {
-            let notices = NoticeRun::of(orders);
+        let mut first = 0;
+        for end in page_ends(&self.steps) {
+            let (steps, notices) = (&self.steps[first..end], NoticeRun::of(&orders[first..end]));
             let is_there = |there: &Page| {
                 there.schema == PAGED_SCHEMA && there.steps == steps && there.notices == notices
             };
-            names.push(match before(at) {
+            names.push(match before(steps[0].period.start) {
                 Some((name, there)) if is_there(&there) => name,
                 _ => {
                     let page = page(steps, notices);
@@ -186,7 +187,9 @@ impl Manifest {
                     name
                 }
             });
+            first = end;
         }
+        let rest = page(&self.steps[first..], NoticeRun::of(&orders[first..]));
         let paged = PagedManifest {
             schema: PAGED_SCHEMA,
             of_schema: self.schema,
@@ -208,110 +211,4 @@ impl Manifest {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::manifest::MANIFEST_SCHEMA;
-    use crate::time::{Period, TimeMs};
-
-    fn manifest(days: usize) -> Manifest {
-        let product: crate::product::ProductId = "p".parse().unwrap();
-        let day = |day: usize| TimeMs::new(day as i64 * 86_400_000).unwrap();
-        let step = |at: usize| Step {
-            period: Period::new(day(at), day(at + 1)).unwrap(),
-            field: ObjectKey::field(&product, &Digest::of(&at.to_le_bytes())),
-            raw_sha256: Digest::of(b""),
-            origin: format!("{at}.nc"),
-            valid_cells: at as u64,
-            masked: None,
-            contributed: None,
-        };
-        // Files of several steps, one of them over the end of a page; some of before orders were kept.
-        let order = |at: usize| {
-            let file = if (100..150).contains(&at) { 100 } else { at };
-            let order = format!("2001-03-01T00:00:00Z/0/{file}/0").parse();
-            (at >= 7).then(|| order.unwrap())
-        };
-        Manifest {
-            schema: MANIFEST_SCHEMA,
-            number: 12,
-            title: "P".to_owned(),
-            quantity: Quantity::CarbonFlux,
-            synthetic: true,
-            source: "s".to_owned(),
-            grid: Grid {
-                rows: 1,
-                cols: 1,
-                north_deg: 1.0,
-                west_deg: 0.0,
-                dlat_deg: 1.0,
-                dlon_deg: 1.0,
-            },
-            steps: (0..days).map(step).collect(),
-            domain: ObjectKey::domain(&product, &Digest::of(b"")),
-            series: vec![],
-            derived_from: Some("q@3-0a1b2c3d".parse().unwrap()),
-            computed: None,
-            notices: NoticeRun::of(&(0..days).map(order).collect::<Vec<_>>()),
-            indexes: vec!["depth=3".parse().unwrap()],
-            product,
-        }
-    }
-
-    #[test]
-    fn a_manifest_of_pages_is_the_same_and_has_the_same_name() {
-        for days in [PAGE_STEPS, 2 * PAGE_STEPS - 1, 3 * PAGE_STEPS + 1] {
-            let whole = manifest(days);
-            let (paged, pages) = whole.paged().unwrap();
-            assert_eq!(pages.len(), days / PAGE_STEPS);
-            let text = serde_json::to_string(&paged).unwrap();
-            let read: PagedManifest = serde_json::from_str(&text).unwrap();
-            let again = read.with_pages(&pages).unwrap();
-            assert_eq!((again.id(), &again), (whole.id(), &whole));
-            assert_eq!(paged.id, whole.id());
-            assert!(paged.clone().with_pages(&pages[1..]).is_err());
-            let mut other = pages;
-            other[0].steps.pop();
-            assert!(paged.with_pages(&other).is_err());
-        }
-        assert_eq!(manifest(PAGE_STEPS - 1).paged(), None);
-    }
-
-    #[test]
-    fn pages_that_are_known_are_compared_and_not_named_again() {
-        let (days, name) = (3 * PAGE_STEPS + 5, Digest::of(b"known"));
-        let (paged, pages) = manifest(days).paged().unwrap();
-        // A name that no page has shows whose name was taken.
-        let before = |at: usize| Some((name, Arc::new(pages[at].clone())));
-        let (same, new) = manifest(days).paged_after(before).unwrap();
-        assert_eq!((same.pages, new), (vec![name; 3], vec![]));
-        let mut changed = manifest(days);
-        changed.steps[PAGE_STEPS].valid_cells += 1;
-        let (other, new) = changed.paged_after(before).unwrap();
-        let page = changed.paged().unwrap().1[1].clone();
-        assert_eq!(new, [(page.name(), page)]);
-        assert_eq!(other.pages, [name, new[0].0, name]);
-        // Another place in the order of notices is another page.
-        let mut changed = manifest(days);
-        let mut orders = changed.notice_orders();
-        orders[0] = orders[7];
-        changed.notices = NoticeRun::of(&orders);
-        let (other, new) = changed.paged_after(before).unwrap();
-        assert_eq!(new.len(), 1);
-        assert_eq!(other.pages, [new[0].0, name, name]);
-        assert_ne!(other.pages[0], paged.pages[0]);
-    }
-
-    #[test]
-    fn one_more_step_leaves_all_pages_as_they_are() {
-        let (before, _) = manifest(300).paged().unwrap();
-        let (after, _) = manifest(301).paged().unwrap();
-        assert_eq!(before.pages, after.pages);
-        let bytes = |days| {
-            serde_json::to_vec(&manifest(days).paged().unwrap().0)
-                .unwrap()
-                .len()
-        };
-        // 67 bytes a page are what grows, and digits of the steps that are in none.
-        assert!(bytes(40 * PAGE_STEPS + 5) < bytes(PAGE_STEPS + 5) + 39 * 67 + 400);
-    }
-}
+mod tests;

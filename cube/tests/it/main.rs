@@ -3,6 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "a test ends where it cannot go on")]
 
 mod at_hand;
+mod compacting;
 mod damage;
 mod follow;
 mod frozen;

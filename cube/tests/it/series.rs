@@ -32,7 +32,7 @@ fn series(grid: &Grid, steps: &[(u32, u32)], row: u32, col: u32) -> Vec<f32> {
 }
 
 /// Has the version these values at some cells, and in the blocks that hold them?
-async fn answers(store: &Store, manifest: &Manifest, steps: &[(u32, u32)]) -> Values {
+pub(crate) async fn answers(store: &Store, manifest: &Manifest, steps: &[(u32, u32)]) -> Values {
     let (grid, of) = (manifest.grid, Arc::new(manifest.clone()));
     let found = Values::of(store, &of).await.unwrap();
     let last = (grid.rows - 1, grid.cols - 1);

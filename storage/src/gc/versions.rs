@@ -5,10 +5,10 @@ use std::collections::BTreeSet;
 use async_trait::async_trait;
 use contract::key::ObjectKey;
 use contract::kind::Kind;
-use contract::manifest::Manifest;
+use contract::manifest::{LEAST_PAGED_STEPS, Manifest};
 
 use super::{Kept, Owner};
-use crate::{StorageError, Store};
+use crate::{StorageError, Store, manifests};
 
 /// Manifests and what they name; but for series, which versions of before name and nobody reads any more.
 #[derive(Debug)]
@@ -42,8 +42,10 @@ impl Owner for Versions {
             let product = &manifest.product;
             keys.insert(ObjectKey::manifest(product, manifest.number));
             keys.insert(manifest.domain.clone());
-            if let Some((paged, _pages)) = manifest.paged() {
-                keys.extend(paged.page_keys());
+            if manifest.steps.len() >= LEAST_PAGED_STEPS {
+                // As they are named: versions of before were cut otherwise.
+                let own = ObjectKey::manifest(product, manifest.number);
+                keys.extend(manifests::page_keys(store, &own).await?);
             }
             for step in &manifest.steps {
                 keys.insert(step.field.clone());

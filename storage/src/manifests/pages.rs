@@ -1,19 +1,20 @@
 //! Pages of manifests: stored once under the digest of their steps, and held, since they never change.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, HashMap};
 use std::sync::Arc;
 
 use contract::digest::Digest;
 use contract::key::ObjectKey;
 use contract::manifest::{Manifest, Page, PagedManifest};
 use contract::product::ProductId;
+use contract::time::TimeMs;
 use futures::stream::{self, StreamExt as _, TryStreamExt as _};
 
 use crate::sound::damage;
 use crate::{StorageError, Store, document};
 
-/// Pages that are read or sent at a time.
-const AT_ONCE: usize = 8;
+/// Pages that are read or sent at a time, 25 kB each.
+const AT_ONCE: usize = 16;
 
 /// The manifest whose pages these are named in.
 ///
@@ -54,18 +55,33 @@ async fn read(store: &Store, key: ObjectKey) -> Result<Arc<Page>, StorageError> 
     Ok(page)
 }
 
+/// Those of some pages of a product that this process holds, by the start of their first step, with their names: none is read.
+pub(super) fn held(
+    store: &Store,
+    product: &ProductId,
+    names: &[Digest],
+) -> HashMap<TimeMs, (Digest, Arc<Page>)> {
+    let own = |name: &Digest| {
+        let page = store.pages.get(&ObjectKey::manifest_page(product, name))?;
+        let start = page.steps.first()?.period.start;
+        Some((start, (*name, page)))
+    };
+    names.iter().filter_map(own).collect()
+}
+
 /// Makes pages of a product durable, but for those that are so because the version before names them.
 pub(super) async fn write(
     store: &Store,
     product: &ProductId,
     pages: Vec<(Digest, Page)>,
-    named_before: &BTreeSet<ObjectKey>,
+    named_before: &[Digest],
 ) -> Result<(), StorageError> {
-    let keyed = |(name, page)| (ObjectKey::manifest_page(product, &name), page);
-    let new = pages.into_iter().map(keyed);
-    let new = new.filter(|(key, _)| !named_before.contains(key));
+    let named_before: BTreeSet<&Digest> = named_before.iter().collect();
+    let new = pages.into_iter();
+    let new = new.filter(|(name, _)| !named_before.contains(name));
     stream::iter(new.collect::<Vec<_>>())
-        .map(|(key, page)| async move {
+        .map(|(name, page)| async move {
+            let key = ObjectKey::manifest_page(product, &name);
             document::put_new(store, &key, &page).await?;
             store.pages.insert(key, Arc::new(page));
             Ok::<_, StorageError>(())
@@ -74,3 +90,6 @@ pub(super) async fn write(
         .try_collect::<()>()
         .await
 }
+
+#[cfg(test)]
+mod tests;

@@ -6,8 +6,8 @@ use contract::key::ObjectKey;
 use contract::manifest::Page;
 use quick_cache::sync::Cache;
 
-/// Pages that are held, 60 kB each: those of a product of 100,000 steps, and some.
-const HELD: usize = 1024;
+/// Pages that are held, 30 kB each: those of a product of 100,000 steps, and some.
+const HELD: usize = 2048;
 
 /// By their keys.
 pub(crate) struct HeldPages(Cache<ObjectKey, Arc<Page>>);

@@ -14,7 +14,7 @@ use contract::grid::Grid;
 use contract::key::ObjectKey;
 use contract::kind::{Kind, Vouched};
 use contract::manifest::{MANIFEST_SCHEMA, Manifest, OLDEST_MANIFEST_SCHEMA, SeriesSegment, Step};
-use contract::manifest::{PAGED_SCHEMA, Page};
+use contract::manifest::{OLDEST_PAGED_SCHEMA, PAGED_SCHEMA, Page};
 use contract::masked::MaskedCells;
 use contract::notice::NoticeRun;
 use contract::product::ProductId;
@@ -368,12 +368,19 @@ async fn a_frozen_version_says_what_was_masked_and_in_which_order_files_came() {
 async fn a_frozen_page_holds_the_steps_of_its_manifest() {
     let (_folder, store) = copy(2);
     let keys = store.list("manifest-pages/fgco2").await.unwrap();
-    let page: Page = document::get(&store, &keys[0]).await.unwrap().unwrap();
-    assert_eq!(keys, [ObjectKey::manifest_page(&product(), &page.name())]);
     let manifest = manifests::numbered(&store, &product(), 2).await.unwrap();
     let manifest = manifest.unwrap();
-    assert_eq!((page.schema, page.steps), (PAGED_SCHEMA, manifest.steps));
-    assert_eq!(page.notices, manifest.notices);
+    let mut schemas = vec![];
+    for key in keys {
+        let page: Page = document::get(&store, &key).await.unwrap().unwrap();
+        assert_eq!(key, ObjectKey::manifest_page(&product(), &page.name()));
+        assert_eq!(page.steps, manifest.steps);
+        assert_eq!(page.notices, manifest.notices);
+        schemas.push(page.schema);
+    }
+    schemas.sort_unstable();
+    let all: Vec<u32> = (OLDEST_PAGED_SCHEMA..=PAGED_SCHEMA).collect();
+    assert_eq!(schemas, all, "freeze a page of each");
 }
 
 #[tokio::test]
