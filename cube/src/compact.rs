@@ -107,7 +107,7 @@ struct Compaction<'a> {
 /// Makes one of them.
 struct Run<'a> {
     of: &'a Compaction<'a>,
-    run: usize,
+    at: usize,
     /// Is the time-major copy there, and sums alone are made?
     has_series: bool,
 }
@@ -118,7 +118,7 @@ impl Run<'_> {
         let session = self.of.repository.session().await?;
         let (series, sums) = (self.of.series_path()?, self.of.sums_path()?);
         let mut made = Made {
-            run: self.run,
+            run: self.at,
             had_series: self.has_series,
             series: vec![],
             sums: vec![],
@@ -131,12 +131,12 @@ impl Run<'_> {
             let place = async {
                 let [values, records] = self.encoded(shard, values).await?;
                 let series = async {
-                    let at = (&series, RunAxis::First.index(shard, self.run));
+                    let at = (&series, RunAxis::First.index(shard, self.at));
                     let sent = placing::send_shard(&session, at, values).await?;
                     Ok::<_, CubeError>((shard, sent))
                 };
                 let sums = async {
-                    let at = (&sums, RunAxis::Last.index(shard, self.run));
+                    let at = (&sums, RunAxis::Last.index(shard, self.at));
                     let sent = placing::send_shard(&session, at, records).await?;
                     Ok::<_, CubeError>((shard, sent))
                 };
@@ -156,7 +156,7 @@ impl Run<'_> {
 
     /// Values of a shard, `[step, row, col]`; none where no cell has data.
     async fn values(&self, shard: Option<[u32; 2]>) -> Result<Option<Vec<f32>>, CubeError> {
-        let (cube, run) = (self.of.cube, self.run);
+        let (cube, run) = (self.of.cube, self.at);
         let Some(shard) = shard else { return Ok(None) };
         if self.has_series {
             return cube.shard(run, shard).await;
@@ -201,7 +201,7 @@ impl Compaction<'_> {
     fn run(&self, run: usize) -> Run<'_> {
         Run {
             of: self,
-            run,
+            at: run,
             has_series: self.cube.runs().is_of(run, self.cube.steps()),
         }
     }

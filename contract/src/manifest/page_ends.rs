@@ -25,7 +25,7 @@ pub(super) fn page_ends(steps: &[Step]) -> Vec<usize> {
     ends
 }
 
-/// Bits of a number such that those of numbers in even steps look drawn by lot: the last step of SplitMix64 (Steele, Lea and Flood 2014,
+/// Bits of a number such that those of numbers in even steps look drawn by lot: the last step of `SplitMix64` (Steele, Lea and Flood 2014,
 /// DOI 10.1145/2660193.2660195, with the constants of its published program).
 fn mixed(ms: i64) -> u64 {
     let bits = ms.cast_unsigned();
@@ -105,7 +105,7 @@ mod tests {
             |end: usize| mixed(steps[end - 1].period.start.ms()).is_multiple_of(ONE_IN);
         // The first step ends no page, and so all ends from the first on that a step says are where they were.
         assert!(!is_by_step(1));
-        let first = (1..).find(|end| is_by_step(*end)).unwrap();
+        let first = (1..=steps.len()).find(|end| is_by_step(*end)).unwrap();
         let from_first = |ends: Vec<usize>| {
             let ends = ends.into_iter().filter(|end| *end >= first);
             ends.collect::<Vec<_>>()

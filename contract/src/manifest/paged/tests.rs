@@ -109,7 +109,7 @@ fn in_even_pages(whole: &Manifest) -> (PagedManifest, Vec<Page>) {
 
 #[test]
 fn pages_of_schema_3_are_read_and_are_of_128_steps_each() {
-    let whole = manifest(0..3 * 128 + 1);
+    let whole = manifest(0..=3 * 128);
     let (paged, pages) = in_even_pages(&whole);
     assert_eq!(paged.clone().with_pages(&pages).unwrap(), whole);
     assert!(paged.clone().with_pages(&pages[1..]).is_err());
