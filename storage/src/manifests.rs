@@ -416,7 +416,8 @@ mod tests {
     async fn one_more_step_writes_no_page_again_and_all_versions_stay_readable() {
         let store = Store::memory();
         let product = "p".parse().unwrap();
-        let days = 643;
+        // Three more than end the ninth page.
+        let days = 533;
         commit(&store, &of_days(1, days)).await.unwrap();
         let before = bytes(&store).await;
         commit(&store, &of_days(2, days + 1)).await.unwrap();

@@ -43,7 +43,7 @@ async fn runs_before_one_that_cannot_be_made_are_there() {
     let months: Vec<(u32, u32)> = (1..=3 * RUN).map(|of| (of, of)).collect();
     let chunks = async || {
         let chunks = store.list("cubes/p/chunks").await.unwrap();
-        BTreeSet::from_iter(chunks)
+        chunks.into_iter().collect::<BTreeSet<_>>()
     };
     let first = version(&store, grid, 1, &months[..2 * RUN as usize]).await;
     follow(&store, &first).await.unwrap();

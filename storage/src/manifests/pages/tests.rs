@@ -10,7 +10,7 @@ use contract::time::Period;
 
 use super::*;
 use crate::gc::{self, Keep, Versions};
-use crate::manifests::{commit, latest, load};
+use crate::manifests::{commit, latest, load, page_names};
 
 /// A version of these days, each of a notice of its own.
 fn of_days(number: u64, days: impl IntoIterator<Item = i64>) -> Manifest {
@@ -85,12 +85,20 @@ async fn a_step_before_all_others_writes_two_pages_at_most_and_reads_none() {
         revised,
     ];
     for next in &versions {
-        // Of one who has seen the version before, and of one who has seen nothing.
-        for store in [copy(&store).await, store.clone()] {
+        // By one who has seen nothing, and by one who has seen the version before.
+        for (store, has_seen) in [(copy(&store).await, false), (store.clone(), true)] {
             let before = pages_there(&store).await.len();
             let (counted, traffic) = store.counted();
+            if has_seen {
+                latest(&counted, &next.product).await.unwrap();
+            }
+            let last = ObjectKey::manifest(&next.product, next.number - 1);
+            let names = page_names(&counted, &last).await.unwrap();
+            let held = held(&counted, &next.product, &names);
+            assert_eq!(held.len(), if has_seen { names.len() } else { 0 });
+            let earlier = traffic.counts();
             commit(&counted, next).await.unwrap();
-            let counts = traffic.counts();
+            let counts = traffic.counts().since(earlier);
             let new = pages_there(&store).await.len() - before;
             assert!((1..=2).contains(&new), "version {}: {new}", next.number);
             assert_eq!(counts.writes, new as u64 + 1, "and the version");
