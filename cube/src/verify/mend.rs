@@ -41,12 +41,15 @@ pub fn mend<'a>(
         let Some(seen) = Seen::of(store, product, &folder).await? else {
             return Ok(false);
         };
-        if seen.is_whole && follows(store, &seen.newest).await? {
-            compact::compact(store, &folder).await?;
-            return Ok(false);
+        let was_there = !seen.keys.is_empty();
+        if was_there {
+            if seen.is_whole && follows(store, &seen.newest).await? {
+                compact::compact(store, &folder).await?;
+                return Ok(false);
+            }
+            clocks::check(store, &folder).await?;
+            remove(store, seen.keys, &folder).await?;
         }
-        clocks::check(store, &folder).await?;
-        remove(store, seen.keys, &folder).await?;
         // Asked for now: others may have published meanwhile, and their version was in the cube that is gone.
         for number in manifests::numbers(store, product).await? {
             if let Some(manifest) = manifests::numbered(store, product, number).await? {
@@ -54,7 +57,7 @@ pub fn mend<'a>(
             }
         }
         compact::compact(store, &folder).await?;
-        Ok(true)
+        Ok(was_there)
     })
 }
 

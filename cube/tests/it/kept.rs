@@ -360,6 +360,25 @@ async fn a_cube_that_is_behind_is_told_and_brought_up() {
 }
 
 #[tokio::test]
+async fn a_cube_that_is_gone_comes_back_with_all_versions_that_are_kept() {
+    let store = Store::memory();
+    let versions = three_versions(&store).await;
+    for key in keys(&store).await {
+        store.remove(&key).await.unwrap();
+    }
+    let product = "p".parse().unwrap();
+    let mending = verify::mending(&store, &product).await;
+    assert_eq!(mending.unwrap(), verify::Mending::BroughtUp);
+    assert!(!verify::mend(&store, &product).await.unwrap());
+    let steps = [(1, 10), (2, 2), (3, 3)];
+    holds(&store, At::Newest, &versions[2], &steps).await;
+    for (at, steps) in [&[(1, 1)][..], &steps[..2], &steps].into_iter().enumerate() {
+        let tag = At::Version((at + 1).to_string());
+        holds(&store, tag, &versions[at], steps).await;
+    }
+}
+
+#[tokio::test]
 async fn a_cube_that_nothing_was_committed_to_yet_is_behind_and_no_more() {
     let inner = Store::memory();
     let first = version(&inner, grid(40, 60), 1, &[(1, 1)]).await;
